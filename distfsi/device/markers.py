@@ -1,0 +1,33 @@
+"""Marks that kernel texts carry, and the words they may use beyond plain Python.
+
+The words have plain Python meanings here, so that a kernel can be read, linted and stepped through without a compiler;
+`device/cpu.py` gives them their fast meanings.
+"""
+
+
+def row(function):
+    """An inner loop that must vectorise: no two array arguments alias, all indexing by load/store."""
+    function.__kind__ = "row"
+    return function
+
+
+def driver(function):
+    """A function called from Python: releases the GIL, is cached on disk, calls rows and formulas."""
+    function.__kind__ = "driver"
+    return function
+
+
+def helper(function):
+    """A function that drivers and rows call, inlined; integers and arrays allowed."""
+    function.__kind__ = "helper"
+    return function
+
+
+def load(A, i):
+    """A.flat[i] with no wrap-around and no bounds check."""
+    return A.flat[i]
+
+
+def store(A, i, x):
+    """A.flat[i] = x with no wrap-around and no bounds check."""
+    A.flat[i] = x

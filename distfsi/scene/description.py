@@ -1,0 +1,268 @@
+"""A scene: everything a run needs to know, checked, frozen, in SI units.
+
+Vectors have one entry per dimension of the domain. Sides are (axis, 0 = low end | 1 = high end).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+
+
+# ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Box:
+    """Axis-parallel box from `lower` to `upper` [m]."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Ball:
+    """Interval, disc or sphere with `center` and `radius` [m]."""
+
+    center: tuple[float, ...]
+    radius: float
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """All points x with (x - point) . normal < 0 [m]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Tube:
+    """Ring (2D) or spherical shell (3D) between two radii about `center` [m]; packed with rings of particles."""
+
+    center: tuple[float, ...]
+    inner_radius: float
+    outer_radius: float
+
+
+Shape = Box | Ball | HalfSpace | Tube
+
+
+# ---- fluid -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class IdealGas:
+    """p = (gamma - 1) rho e."""
+
+    gamma: float
+
+
+@dataclass(frozen=True)
+class StiffenedGas:
+    """p = (gamma - 1) rho e - gamma p_inf (paper, Eq. 14 corrected)."""
+
+    gamma: float
+    p_inf: float
+
+
+@dataclass(frozen=True)
+class Jwl:
+    """p = A(1 - w/(R1 v)) exp(-R1 v) + B(1 - w/(R2 v)) exp(-R2 v) + w rho e, v = rho0/rho (paper, Eq. 13)."""
+
+    rho0: float
+    A: float
+    B: float
+    R1: float
+    R2: float
+    omega: float
+
+
+FluidEos = IdealGas | StiffenedGas | Jwl
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One of the fluid's materials."""
+
+    name: str
+    eos: FluidEos
+
+
+@dataclass(frozen=True)
+class FluidState:
+    """State of one pure phase: density [kg/m3], pressure [Pa], velocity [m/s]; `phase` indexes Fluid.phases."""
+
+    phase: int
+    density: float
+    pressure: float
+    velocity: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Region:
+    """Initial state inside `shape` (None: everywhere). Later regions paint over earlier ones."""
+
+    state: FluidState
+    shape: Shape | None
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """The compressible flow. One phase: Euler; two: the six-equation model."""
+
+    phases: tuple[Phase, ...]
+    regions: tuple[Region, ...]
+    reconstruction: Literal["first_order", "minmod", "van_leer"]
+    minimum_volume_fraction: float
+    inflow: tuple[tuple[FluidState | None, FluidState | None], ...]  # per axis, per side
+    precision: Literal["float64", "float32"]
+
+
+# ---- solid -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MieGrueneisen:
+    """Shock EOS with U = c0 + s1 u (+ s2, s3), Grueneisen gamma0 + a mu, energy per reference volume (A.1 corrected)."""
+
+    c0: float
+    s1: float
+    s2: float
+    s3: float
+    gamma0: float
+    a: float
+
+
+@dataclass(frozen=True)
+class LinearEos:
+    """p = K (rho/rho0 - 1)."""
+
+    bulk_modulus: float
+
+
+@dataclass(frozen=True)
+class NoStrength:
+    """A fluid-like solid: no deviatoric stress."""
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Hooke's law with the Jaumann rate (A.3)."""
+
+    shear_modulus: float
+
+
+@dataclass(frozen=True)
+class PerfectlyPlastic:
+    """Elastic up to `yield_stress`, then radial return (A.5)."""
+
+    shear_modulus: float
+    yield_stress: float
+
+
+@dataclass(frozen=True)
+class JohnsonCook:
+    """Yield stress (A + B eps^n)(1 + C ln(rate/reference_rate))(1 - T*^m) (A.6); heat capacity in J/(kg K)."""
+
+    shear_modulus: float
+    A: float
+    B: float
+    n: float
+    C: float
+    m: float
+    reference_rate: float
+    room_temperature: float
+    melt_temperature: float
+    heat_capacity: float
+    taylor_quinney: float
+
+
+Strength = NoStrength | Elastic | PerfectlyPlastic | JohnsonCook
+
+
+@dataclass(frozen=True)
+class Body:
+    """A solid body packed with particles `spacing` [m] apart. Particles inside `fixed` (if any) do not move."""
+
+    name: str
+    shape: Shape
+    spacing: float
+    density: float
+    velocity: tuple[float, ...]
+    eos: MieGrueneisen | LinearEos
+    strength: Strength
+    fixed: Shape | None
+
+
+@dataclass(frozen=True)
+class Solid:
+    """All bodies and how they are computed. h = smoothing * spacing; Monaghan viscosity alpha, beta (Eq. 6)."""
+
+    bodies: tuple[Body, ...]
+    smoothing: float
+    viscosity_alpha: float
+    viscosity_beta: float
+
+
+# ---- the whole -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    cells: tuple[int, ...]
+    boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+
+    @property
+    def dimensions(self) -> int:
+        return len(self.cells)
+
+    @property
+    def spacing(self) -> tuple[float, ...]:
+        return tuple((b - a) / n for a, b, n in zip(self.lower, self.upper, self.cells, strict=True))
+
+
+@dataclass(frozen=True)
+class Time:
+    """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d."""
+
+    end: float
+    cfl: float
+    maximum_steps: int | None
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps."""
+
+    directory: str
+    fields_every: float
+    history_every: int
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Block and tile sizes in cells per axis; they change speed only, never a bit of the result."""
+
+    block_cells: tuple[int, ...]
+    tile_cells: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A checked scene."""
+
+    title: str
+    domain: Domain
+    time: Time
+    gravity: tuple[float, ...]
+    fluid: Fluid | None
+    solid: Solid | None
+    output: Output
+    performance: Performance
