@@ -4,6 +4,8 @@ The words have plain Python meanings here, so that a kernel can be read, linted 
 `device/cpu.py` gives them their fast meanings.
 """
 
+import numpy as np
+
 
 def row(function):
     """An inner loop that must vectorise: no two array arguments alias, all indexing by load/store."""
@@ -31,3 +33,8 @@ def load(A, i):
 def store(A, i, x):
     """A.flat[i] = x with no wrap-around and no bounds check."""
     A.flat[i] = x
+
+
+def workspace(n):
+    """n uninitialised reals that live as long as the driver call."""
+    return np.empty(n)

@@ -126,7 +126,7 @@ class Fluid:
 
 @dataclass(frozen=True)
 class MieGrueneisen:
-    """Shock EOS with U = c0 + s1 u (+ s2, s3), Grueneisen gamma0 + a mu, energy per reference volume (A.1 corrected)."""
+    """Shock EOS, U = c0 + s1 u (+ s2, s3), Grueneisen gamma0 + a mu, energy per reference volume (A.1 corrected)."""
 
     c0: float
     s1: float

@@ -1,0 +1,119 @@
+"""The CPU as a device: compile emitted modules with numba, keep them on disk, run drivers on a team of threads."""
+
+from __future__ import annotations
+
+import fcntl
+import importlib.util
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+from distfsi.device import emit, runtime
+from distfsi.device.fold import Bound, NotInSubset
+
+__all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
+
+
+def cache_directory() -> Path:
+    """Where compiled modules live: $DISTFSI_CACHE, else the user's cache folder."""
+    root = os.environ.get("DISTFSI_CACHE")
+    if root is None:
+        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
+    return Path(root)
+
+
+def build(
+    drivers: Iterable[Callable],
+    constants: Mapping[str, object],
+    bindings: Mapping[str, Bound] | None = None,
+    real: str = "float64",
+) -> SimpleNamespace:
+    """Compile each driver, specialised for a scene, as a module of its own.
+
+    `constants` are the names a scene fixes, `bindings` the formulas it chooses for a name. Returns a namespace with the drivers
+    under their own names; compilation happens at a driver's first call and is kept on disk. Raises NotInSubset.
+    """
+    compiled = {}
+    for driver in drivers:
+        text = emit.numba_text(driver, constants, bindings or {}, real, runtime.VERSION)
+        module = _load(emit.module_name(driver, text), text)
+        compiled[driver.__name__] = _Compiled(getattr(module, driver.__name__), Path(module.__file__))
+    return SimpleNamespace(**compiled)
+
+
+def _load(name: str, text: str) -> ModuleType:
+    full_name = f"distfsi_kernels.{name}"
+    if full_name in sys.modules:
+        return sys.modules[full_name]
+    directory = cache_directory()
+    directory.mkdir(parents=True, exist_ok=True)
+    path = directory / f"{name}.py"
+    if not path.exists():
+        unfinished = path.with_suffix(f".{os.getpid()}")
+        unfinished.write_text(text)
+        os.replace(unfinished, path)
+    spec = importlib.util.spec_from_file_location(full_name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[full_name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+class _Compiled:
+    """A driver that compiles at its first call, in one process of a machine at a time: the others then find it on disk."""
+
+    def __init__(self, dispatcher: Callable, path: Path):
+        self.dispatcher, self.path = dispatcher, path
+        self._call: Callable = self._first_call
+        self._lock = threading.Lock()
+
+    def __call__(self, *arguments):
+        return self._call(*arguments)
+
+    def _first_call(self, *arguments):
+        with self._lock:
+            if self._call is not self.dispatcher:
+                with open(self.path.with_suffix(".lock"), "w") as lock:
+                    fcntl.flock(lock, fcntl.LOCK_EX)
+                    result = self.dispatcher(*arguments)
+                self._call = self.dispatcher
+                return result
+        return self.dispatcher(*arguments)
+
+
+class Team:
+    """Threads of one rank that share the items of a driver call."""
+
+    CHUNKS_PER_THREAD = 4
+
+    def __init__(self, threads: int):
+        self.threads = max(1, threads)
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    def run(self, function: Callable, count: int, *arguments) -> None:
+        """Call `function(begin, end, *arguments)` on ranges that together cover 0 … count."""
+        if self._pool is None or count < 2:
+            if count:
+                function(0, count, *arguments)
+            return
+        chunks = min(count, self.threads * self.CHUNKS_PER_THREAD)
+        edges = [count * c // chunks for c in range(chunks + 1)]
+        ranges = iter(zip(edges[:-1], edges[1:], strict=True))
+        guard = threading.Lock()
+
+        def work() -> None:
+            while True:
+                with guard:
+                    piece = next(ranges, None)
+                if piece is None:
+                    return
+                function(*piece, *arguments)
+
+        others = [self._pool.submit(work) for _ in range(self.threads - 1)]
+        work()
+        for other in others:
+            other.result()

@@ -1,0 +1,154 @@
+"""Emission: drivers and all the formulas they reach -> the text of one module, specialised for a scene.
+
+The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be stale.
+CUDA C will be a second writer beside `numba_text`, of the same folded functions.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from distfsi.device import markers
+from distfsi.device.fold import Bound, Fold, NotInSubset, Source, constant_of
+
+
+@dataclass
+class Emission:
+    """The functions that `driver` reaches, folded, callees first."""
+
+    constants: Mapping[str, object]
+    bindings: Mapping[str, Bound]
+    functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
+    _names: dict[tuple[Callable, str], str] = field(default_factory=dict)
+
+    def add(self, function: Callable, scope: Mapping[str, object], suffix: str = "") -> str:
+        """Fold `function` and all it calls; return the name it is emitted under."""
+        key = (function, suffix)
+        if key in self._names:
+            return self._names[key]
+        name = function.__name__ + suffix
+        if name in self.functions or name in self._names.values():
+            raise NotInSubset(f"two functions would be emitted as {name}")
+        self._names[key] = name
+        source = Source(function)
+        tree = Fold(
+            source, lambda n: self._constant(function, scope, n), lambda n: self._callee(function, scope, suffix, n)
+        ).run()
+        tree.name = name
+        self.functions[name] = (source, tree)
+        return name
+
+    def _constant(self, function: Callable, scope: Mapping[str, object], name: str) -> object:
+        if name in scope:
+            return scope[name]
+        if name in self.constants:
+            return self.constants[name]
+        value = function.__globals__[name]
+        if isinstance(value, (bool, int, float)) or (
+            isinstance(value, tuple) and all(isinstance(v, (int, float)) for v in value)
+        ):
+            return value
+        raise KeyError(name)
+
+    def _callee(
+        self, caller: Callable, scope: Mapping[str, object], suffix: str, name: str
+    ) -> tuple[str, ast.expr | None]:
+        if name in self.bindings:
+            bound = self.bindings[name]
+            emitted = self.add(bound.function, bound.constants, "__" + name)
+        else:
+            function = caller.__globals__.get(name)
+            if not callable(function) or not hasattr(function, "__code__"):
+                raise NotInSubset(f"{Source(caller).place}: {name} is not a formula and the scene binds nothing to it")
+            emitted = self.add(function, scope, suffix if scope else "")
+        return emitted, self._constant_result(emitted)
+
+    def _constant_result(self, name: str) -> ast.expr | None:
+        """The value of a function that merely returns a constant."""
+        body = self.functions[name][1].body
+        if len(body) == 1 and isinstance(body[0], ast.Return) and constant_of(body[0].value)[0]:
+            return body[0].value
+        return None
+
+
+class _TypedLiterals(ast.NodeTransformer):
+    """Every float literal becomes a module constant of the real type, so that float32 stays float32."""
+
+    def __init__(self):
+        self.names: dict[str, str] = {}
+
+    def visit_Constant(self, node: ast.Constant):
+        if not isinstance(node.value, float):
+            return node
+        return ast.Name(self.names.setdefault(repr(node.value), f"c{len(self.names)}_"), ast.Load())
+
+
+def numba_text(
+    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str, runtime_version: str
+) -> str:
+    """The module text for one driver; `real` is "float64" or "float32"."""
+    emission = Emission(constants, bindings)
+    emission.add(driver, {})
+    literals, parts = _TypedLiterals(), []
+    for source, tree in _callees_first(emission.functions):
+        text = ast.unparse(ast.fix_missing_locations(literals.visit(tree)))
+        parts.append(f"# {source.place}\n@{source.kind}\n{text}")
+    values = [f"{name} = real({_number(value)})" for value, name in literals.names.items()]
+    head = [
+        f"# distfsi kernel module, runtime {runtime_version}",
+        "import numpy as np",
+        "from math import floor, log, pow, sqrt",
+        "from distfsi.device.runtime import driver, formula, helper, load, max_ as max, min_ as min, row, store",
+        f"from distfsi.device.runtime import exp_{real} as exp",
+        f"real = np.{real}",
+        "",
+        "@helper",
+        "def workspace(n):",
+        "    return np.empty(n, real)",
+    ]
+    return "\n".join(head) + "\n\n" + "\n".join(values) + "\n\n" + "\n\n".join(parts) + "\n"
+
+
+def _number(text: str) -> str:
+    return {"inf": "np.inf", "-inf": "-np.inf", "nan": "np.nan"}.get(text, text)
+
+
+def _callees_first(functions: Mapping[str, tuple[Source, ast.FunctionDef]]) -> list[tuple[Source, ast.FunctionDef]]:
+    """Only the functions still called after folding, each after those it calls."""
+    ordered: dict[str, tuple[Source, ast.FunctionDef]] = {}
+
+    def place(name: str) -> None:
+        if name in ordered or name not in functions:
+            return
+        for node in ast.walk(functions[name][1]):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                place(node.func.id)
+        ordered[name] = functions[name]
+
+    place(next(reversed(functions)))
+    return list(ordered.values())
+
+
+def module_name(driver: Callable, text: str) -> str:
+    """The name under which a module text is stored and cached."""
+    return f"{driver.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+
+
+def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound] | None = None) -> Callable:
+    """`function` as plain Python with the scene's values in place: for set-up, tests and debugging.
+
+    Works on numpy arrays too, as long as the formula makes no choices.
+    """
+    emission = Emission(constants, bindings or {})
+    name = emission.add(function, {})
+    words = {"sqrt": np.sqrt, "exp": np.exp, "log": np.log, "pow": np.power, "floor": np.floor, "workspace": np.empty}
+    namespace = {**words, "load": markers.load, "store": markers.store, "real": float}
+    namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
+    for _, tree in _callees_first(emission.functions):
+        exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)
+    return namespace[name]

@@ -1,0 +1,375 @@
+"""Folding: one function of the formula subset with everything a scene fixes replaced by its value.
+
+The result is a plain `ast.FunctionDef` in which constants are literals, branches on constants are resolved, `static_range` loops are
+unrolled and arithmetic with 0 and 1 has vanished. Anything outside the subset is refused with the file and line it stands on.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import inspect
+import operator
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max", "floor")
+KERNEL_WORDS = ("load", "store", "workspace", "range", "int", "len", "real")
+
+_OPERATORS = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.USub: operator.neg, ast.Not: operator.not_,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.BitAnd: operator.and_, ast.BitOr: operator.or_, ast.LShift: operator.lshift, ast.RShift: operator.rshift,
+}  # fmt: skip
+
+
+class NotInSubset(Exception):
+    """A formula or kernel uses something that cannot be emitted."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The formula a scene puts in the place of a name, with the constants that belong to it alone."""
+
+    function: Callable
+    constants: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A function's text: its tree, its file and line, and the names its module gives it."""
+
+    function: Callable
+
+    @property
+    def kind(self) -> str:
+        return getattr(self.function, "__kind__", "formula")
+
+    @property
+    def place(self) -> str:
+        module = self.function.__module__.replace(".", "/")
+        return f"{module}.py, line {self.function.__code__.co_firstlineno}"
+
+    def tree(self) -> ast.FunctionDef:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(self.function))).body[0]
+        if not isinstance(tree, ast.FunctionDef):
+            raise NotInSubset(f"{self.place}: only plain functions can be emitted")
+        return tree
+
+
+def literal(value: object) -> ast.expr:
+    """The tree of a constant: a number, a truth value or a tuple of them."""
+    if isinstance(value, tuple):
+        return ast.Tuple([literal(item) for item in value], ast.Load())
+    return ast.Constant(value)
+
+
+def constant_of(node: ast.expr) -> tuple[bool, object]:
+    """(True, value) when the tree is a constant or a tuple of constants."""
+    if isinstance(node, ast.Constant):
+        return True, node.value
+    if isinstance(node, ast.Tuple):
+        parts = [constant_of(item) for item in node.elts]
+        if all(known for known, _ in parts):
+            return True, tuple(value for _, value in parts)
+    return False, None
+
+
+class Fold(ast.NodeTransformer):
+    """Folds one function. `lookup(name)` gives a scene constant or raises KeyError; `call(name)` gives the name a callee is emitted
+    under and, when the callee merely returns a constant, that constant."""
+
+    def __init__(
+        self, source: Source, lookup: Callable[[str], object], call: Callable[[str], tuple[str, ast.expr | None]]
+    ):
+        self.source, self.lookup, self.call = source, lookup, call
+        self.known: dict[str, ast.expr] = {}
+        self.locals: set[str] = set()
+        self.in_kernel = source.kind != "formula"
+
+    def refuse(self, node: ast.AST, why: str) -> NotInSubset:
+        line = self.source.function.__code__.co_firstlineno + getattr(node, "lineno", 1) - 1
+        return NotInSubset(f"{self.source.function.__module__} line {line}, in {self.source.function.__name__}: {why}")
+
+    def run(self) -> ast.FunctionDef:
+        tree = self.source.tree()
+        tree.decorator_list, tree.returns = [], None
+        for argument in tree.args.args:
+            argument.annotation = None
+        self.locals = {a.arg for a in tree.args.args} | {
+            n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        }
+        assigned = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        loops = [n for n in ast.walk(tree) if isinstance(n, (ast.For, ast.While, ast.AugAssign))]
+        inside = {
+            n.id for loop in loops for n in ast.walk(loop) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        }
+        self.propagate = {name for name in assigned if assigned.count(name) == 1} - inside
+        tree.body = self.statements(tree.body)
+        return ast.fix_missing_locations(tree)
+
+    # ---- statements ----------------------------------------------------------------------------------------------------
+
+    def statements(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        out: list[ast.stmt] = []
+        for statement in body:
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                continue  # docstring
+            result = self.visit(statement)
+            out += result if isinstance(result, list) else [result] if result is not None else []
+        return out
+
+    def visit_Assign(self, node: ast.Assign):
+        if len(node.targets) != 1:
+            raise self.refuse(node, "one target per assignment")
+        node.value = self.visit(node.value)
+        target = node.targets[0]
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and constant_of(node.value)[0]:
+            parts = zip(target.elts, node.value.elts, strict=True)
+            return self.statements([ast.copy_location(ast.Assign([t], v), node) for t, v in parts])
+        if isinstance(target, ast.Name):
+            if target.id in self.propagate and constant_of(node.value)[0]:
+                self.known[target.id] = node.value
+                return None
+        elif isinstance(target, ast.Subscript):
+            if not self.in_kernel:
+                raise self.refuse(node, "a formula does not write into its arguments")
+            node.targets = [self.visit(target)]
+        elif not isinstance(target, ast.Tuple):
+            raise self.refuse(node, "assign to names only")
+        return node
+
+    def visit_AugAssign(self, node: ast.AugAssign):
+        if not self.in_kernel:
+            raise self.refuse(node, "a formula names each value once (no +=)")
+        node.value = self.visit(node.value)
+        if isinstance(node.target, ast.Subscript):
+            node.target = self.visit(node.target)
+        return node
+
+    def visit_If(self, node: ast.If):
+        test = self.visit(node.test)
+        known, value = constant_of(test)
+        if known:
+            return self.statements(node.body if value else node.orelse)
+        if not self.in_kernel:
+            raise self.refuse(node, "a formula does not branch at run time; write `x if condition else y`")
+        node.test, node.body, node.orelse = test, self.statements(node.body), self.statements(node.orelse)
+        if not node.body:
+            node.body = [ast.Pass()]
+        return node
+
+    def visit_For(self, node: ast.For):
+        if node.orelse:
+            raise self.refuse(node, "no else on a loop")
+        if self.is_static_range(node.iter):
+            out = []
+            for value in self.static_values(node.iter):
+                self.known[node.target.id] = ast.Constant(value)
+                out += self.statements(copy.deepcopy(node.body))
+            self.known.pop(node.target.id, None)
+            return out
+        if not self.in_kernel:
+            raise self.refuse(node, "a formula loops over static_range only")
+        node.iter, node.body = self.visit(node.iter), self.statements(node.body)
+        return node
+
+    def visit_While(self, node: ast.While):
+        if not self.in_kernel:
+            raise self.refuse(node, "a formula loops over static_range only")
+        node.test, node.body = self.visit(node.test), self.statements(node.body)
+        return node
+
+    def visit_Return(self, node: ast.Return):
+        node.value = self.visit(node.value) if node.value is not None else None
+        return node
+
+    def visit_Expr(self, node: ast.Expr):
+        if not self.in_kernel or not isinstance(node.value, ast.Call):
+            raise self.refuse(node, "a statement that has no effect")
+        node.value = self.visit(node.value)
+        return node
+
+    # ---- expressions ---------------------------------------------------------------------------------------------------
+
+    def visit_Name(self, node: ast.Name):
+        if not isinstance(node.ctx, ast.Load):
+            return node
+        if node.id in self.known:
+            return copy.deepcopy(self.known[node.id])
+        if node.id in self.locals:
+            return node
+        try:
+            return literal(self.lookup(node.id))
+        except KeyError:
+            raise self.refuse(node, f"{node.id} is neither a local name nor fixed by the scene") from None
+
+    def visit_BinOp(self, node: ast.BinOp):
+        node.left, node.right = self.visit(node.left), self.visit(node.right)
+        if type(node.op) not in _OPERATORS:
+            raise self.refuse(node, f"operator {type(node.op).__name__} is not in the subset")
+        left, right = node.left, node.right
+        if isinstance(left, ast.Constant) and isinstance(right, ast.Constant):
+            return ast.copy_location(ast.Constant(_OPERATORS[type(node.op)](left.value, right.value)), node)
+        simpler = self.identity(node)
+        if simpler is not None:
+            return simpler
+        if not self.in_kernel:
+            for side in (left, right):
+                if isinstance(side, ast.Constant) and type(side.value) is int:
+                    raise self.refuse(node, f"write {side.value}.0: an integer would turn float32 into float64")
+        return node
+
+    @staticmethod
+    def identity(node: ast.BinOp) -> ast.expr | None:
+        """x + 0, 0 + x, x - 0, 0 - x, x * 0, x * 1, 0 / x, x / 1 without their second operand."""
+
+        def is_(side: ast.expr, value: float) -> bool:
+            return isinstance(side, ast.Constant) and not isinstance(side.value, bool) and side.value == value
+
+        left, right, op = node.left, node.right, type(node.op)
+        if op is ast.Add and (is_(left, 0) or is_(right, 0)):
+            return right if is_(left, 0) else left
+        if op is ast.Sub and is_(right, 0):
+            return left
+        if op is ast.Sub and is_(left, 0):
+            return ast.copy_location(ast.UnaryOp(ast.USub(), right), node)
+        if op is ast.Mult and (is_(left, 0) or is_(right, 0)):
+            return left if is_(left, 0) else right
+        if op is ast.Mult and (is_(left, 1) or is_(right, 1)):
+            return right if is_(left, 1) else left
+        if op is ast.Div and (is_(left, 0) or is_(right, 1)):
+            return left
+        return None
+
+    def visit_UnaryOp(self, node: ast.UnaryOp):
+        node.operand = self.visit(node.operand)
+        if isinstance(node.operand, ast.Constant) and type(node.op) in _OPERATORS:
+            return ast.copy_location(ast.Constant(_OPERATORS[type(node.op)](node.operand.value)), node)
+        return node
+
+    def visit_Compare(self, node: ast.Compare):
+        if len(node.ops) != 1:
+            raise self.refuse(node, "one comparison at a time")
+        node.left, node.comparators = self.visit(node.left), [self.visit(node.comparators[0])]
+        (known_l, left), (known_r, right) = constant_of(node.left), constant_of(node.comparators[0])
+        if known_l and known_r:
+            return ast.copy_location(ast.Constant(_OPERATORS[type(node.ops[0])](left, right)), node)
+        return node
+
+    def visit_BoolOp(self, node: ast.BoolOp):
+        stop = isinstance(node.op, ast.Or)  # the value that decides
+        values = []
+        for value in (self.visit(v) for v in node.values):
+            known, truth = constant_of(value)
+            if known and bool(truth) == stop:
+                values.append(ast.Constant(stop))
+                break
+            if not known:
+                values.append(value)
+        if not values:
+            return ast.Constant(not stop)
+        node.values = values
+        return values[0] if len(values) == 1 else node
+
+    def visit_IfExp(self, node: ast.IfExp):
+        test = self.visit(node.test)
+        known, value = constant_of(test)
+        if known:
+            return self.visit(node.body if value else node.orelse)
+        node.test, node.body, node.orelse = test, self.visit(node.body), self.visit(node.orelse)
+        return node
+
+    def visit_Subscript(self, node: ast.Subscript):
+        node.value, node.slice = self.visit(node.value), self.visit(node.slice)
+        known, index = constant_of(node.slice)
+        if known and isinstance(node.value, ast.Tuple):
+            return node.value.elts[index]
+        if not known and not self.in_kernel:
+            raise self.refuse(node, "a formula's index must be fixed by the scene")
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute):
+        if not self.in_kernel or node.attr not in ("shape", "size"):
+            raise self.refuse(node, "no attributes but the shape and size of arrays, and those in kernels")
+        return node
+
+    def visit_Tuple(self, node: ast.Tuple):
+        if isinstance(node.ctx, ast.Load):
+            node.elts = self.expanded(node.elts)
+        return node
+
+    def visit_Call(self, node: ast.Call):
+        if not isinstance(node.func, ast.Name) or node.keywords:
+            raise self.refuse(node, "call functions by their plain names, without keywords")
+        name = node.func.id
+        if name in ("tuple", "sum"):
+            items = self.unrolled(node.args[0])
+            if name == "tuple":
+                return ast.copy_location(ast.Tuple(items, ast.Load()), node)
+            total = items[0] if items else ast.Constant(0.0)
+            for item in items[1:]:
+                total = ast.BinOp(total, ast.Add(), item)
+            return ast.copy_location(total, node)
+        node.args = self.expanded(node.args)
+        if name in MATH_WORDS or (self.in_kernel and name in KERNEL_WORDS):
+            return node
+        if name in self.locals:
+            raise self.refuse(node, f"{name} is a local value, not a formula")
+        emitted, constant = self.call(name)
+        if constant is not None:
+            return copy.deepcopy(constant)
+        node.func = ast.Name(emitted, ast.Load())
+        return node
+
+    def generic_visit(self, node: ast.AST):
+        if isinstance(node, (ast.Constant, ast.Name, ast.Pass, ast.Break, ast.Continue, ast.Load, ast.Store)):
+            return node
+        raise self.refuse(node, f"{type(node).__name__} is not in the subset")
+
+    # ---- unrolling -----------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def is_static_range(node: ast.expr) -> bool:
+        return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "static_range"
+
+    def static_values(self, call: ast.Call) -> range:
+        bounds = [constant_of(self.visit(copy.deepcopy(a))) for a in call.args]
+        if not all(known for known, _ in bounds):
+            raise self.refuse(call, "the bounds of static_range must be fixed by the scene")
+        return range(*(value for _, value in bounds))
+
+    def unrolled(self, node: ast.expr) -> list[ast.expr]:
+        """The items of `f(d) for d in static_range(N)`."""
+        if not isinstance(node, ast.GeneratorExp) or len(node.generators) != 1 or node.generators[0].ifs:
+            raise self.refuse(node, "expected `expression for name in static_range(N)`")
+        generator = node.generators[0]
+        if not self.is_static_range(generator.iter):
+            raise self.refuse(node, "expected `expression for name in static_range(N)`")
+        name, items = generator.target.id, []
+        before = self.known.get(name)
+        for value in self.static_values(generator.iter):
+            self.known[name] = ast.Constant(value)
+            items.append(self.visit(copy.deepcopy(node.elt)))
+        if before is None:
+            self.known.pop(name, None)
+        else:
+            self.known[name] = before
+        return items
+
+    def expanded(self, items: list[ast.expr]) -> list[ast.expr]:
+        """Arguments or tuple elements with `*(… for … in static_range(N))` and `*(a, b)` written out."""
+        out: list[ast.expr] = []
+        for item in items:
+            if not isinstance(item, ast.Starred):
+                out.append(self.visit(item))
+            elif isinstance(item.value, ast.GeneratorExp):
+                out += self.unrolled(item.value)
+            else:
+                value = self.visit(item.value)
+                if not isinstance(value, ast.Tuple):
+                    raise self.refuse(item, "a star needs a tuple written out or a generator over static_range")
+                out += value.elts
+        return out

@@ -1,0 +1,107 @@
+"""What emitted numba modules import: the decorators behind the markers, and raw loads and stores.
+
+Fast rows need two things numba does not do by itself: arguments that do not alias (a compile option it has inside but does not
+show) and indexing without wrap-around. Both are held by tests/test_vectorised.py. Fast math stays off: NaN checks stay valid and
+results do not depend on how a loop was vectorised.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+from llvmlite import ir
+from numba import literal_unroll, njit, types
+from numba.core.options import TargetOptions
+from numba.core.registry import cpu_target
+from numba.extending import intrinsic
+
+VERSION = "3"
+LN_2 = "0.693147180559945309417232121458176568075500134360255"
+
+_OPTIONS = cpu_target.options
+if not hasattr(_OPTIONS, "noalias"):
+    _OPTIONS.noalias = TargetOptions.Mapping("noalias")
+
+formula = njit(forceinline=True, error_model="numpy")
+helper = njit(forceinline=True, error_model="numpy")
+row = njit(error_model="numpy", noalias=True)
+driver = njit(error_model="numpy", nogil=True, cache=True)
+
+
+@formula
+def min_(a, b):
+    """a if a < b else b, as on every device (numba's own min treats NaN otherwise)."""
+    return a if a < b else b
+
+
+@formula
+def max_(a, b):
+    """a if a > b else b, as on every device."""
+    return a if a > b else b
+
+
+@intrinsic
+def load(typing_context, array, index):
+    """array.flat[index] of a contiguous array: no wrap-around, no bounds check."""
+
+    def code(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.load(builder.gep(data, [arguments[1]], inbounds=True))
+
+    return array.dtype(array, types.intp), code
+
+
+@intrinsic
+def store(typing_context, array, index, value):
+    """array.flat[index] = value of a contiguous array: no wrap-around, no bounds check."""
+
+    def code(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        builder.store(arguments[2], builder.gep(data, [arguments[1]], inbounds=True))
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, array.dtype), code
+
+
+@intrinsic
+def _two_to_the(typing_context, shifted):
+    """2^n, where `shifted` is n plus 1.5 times 2 to the number of mantissa bits: n then stands in the lowest bits."""
+
+    def code(context, builder, signature, arguments):
+        bits, mantissa, bias = (64, 52, 1023) if signature.args[0] == types.float64 else (32, 23, 127)
+        integer = ir.IntType(bits)
+        n = builder.bitcast(arguments[0], integer)
+        exponent = builder.add(builder.shl(n, ir.Constant(integer, mantissa)), ir.Constant(integer, bias << mantissa))
+        return builder.bitcast(exponent, arguments[0].type)
+
+    return shifted(shifted), code
+
+
+def _exponential(real: type, mantissa: int, degree: int, lowest: float, highest: float, split: int):
+    """exp(x) by x = n ln 2 + r and a polynomial in r, in arithmetic that vectorises (libm's does not) and has the same bits on
+    every device. Below `lowest` and above `highest` it stays at the value there. `split`: bits of ln 2 in its first part."""
+    shift, per_two = real(1.5 * 2.0**mantissa), real(1.0 / math.log(2.0))
+    high = real(math.floor(math.log(2.0) * 2.0**split) / 2.0**split)
+    low = real(Fraction(LN_2) - Fraction(float(high)))
+    lowest, highest, one = real(lowest), real(highest), real(1.0)
+    coefficients = tuple(real(1.0 / math.factorial(k)) for k in range(degree, -1, -1))
+
+    @formula
+    def exponential(x):
+        x = lowest if x < lowest else x
+        x = highest if x > highest else x
+        shifted = x * per_two + shift
+        n = shifted - shift
+        r = (x - n * high) - n * low
+        total = coefficients[0] * one
+        for k in literal_unroll(coefficients[1:]):
+            total = total * r + k
+        return total * _two_to_the(shifted)
+
+    return exponential
+
+
+exp_float64 = _exponential(np.float64, 52, 13, -708.0, 709.0, 32)
+exp_float32 = _exponential(np.float32, 23, 7, -87.0, 88.0, 12)

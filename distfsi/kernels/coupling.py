@@ -1,0 +1,368 @@
+"""Loops of the coupling: which cells the solid covers, what they hold, and what the fluid gives to the particles.
+
+A cell is named by its flat index `at` in a field of one variable: block * (cells of a block in memory) + place in the block.
+`shape` is that of a block in memory (Z, Y, X); `lower`, `spacing` the grid's, `origin`, `extent` the blocks'.
+"""
+
+from math import floor
+
+from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
+from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
+from distfsi.physics.tensors import dot
+
+# What a cell is: fluid; fluid since this step; not yet looked at; behind the wall; farther behind than fluxes look.
+FLUID, FRESH, UNKNOWN, COVERED, DEEP = range(5)
+
+# ---- places -----------------------------------------------------------------------------------------------------------
+
+
+@helper
+def cell_at(block, i, j, k, shape):
+    """Flat index of an active cell of a block."""
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    return ((block * shape[0] + k + gz) * shape[1] + j + gy) * shape[2] + i + 2
+
+
+@helper
+def center_of(at, shape, lower, spacing, origin):
+    """Center [m] of the cell `at`."""
+    block = at // (shape[0] * shape[1] * shape[2])
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    index = (at % shape[2] - 2, at // shape[2] % shape[1] - gy, at // (shape[1] * shape[2]) % shape[0] - gz)
+    return tuple(lower[d] + (origin[block, d] + index[d] + 0.5) * spacing[d] for d in static_range(DIMENSIONS))
+
+
+# ---- sums over particles ------------------------------------------------------------------------------------------------
+
+
+@helper
+def bins_within(x, radius, lower, size, low, window):
+    """First and past-the-end search cell, along one axis of the window, of points within `radius` of x."""
+    first = int(floor((x - radius - lower) / size) - low) + 1
+    last = int(floor((x + radius - lower) / size) - low) + 1
+    return (min(max(first, 0), window), min(max(last + 1, 0), window))
+
+
+@helper
+def any_particle(center, reach, start, lower, size, low, window, strides):
+    """Whether a search cell that a box of half width `reach` touches holds particles."""
+    x = bins_within(center[0], reach[0], lower[0], size, low[0], window[0])
+    y, z = (0, 1), (0, 1)
+    if DIMENSIONS > 1:
+        y = bins_within(center[1], reach[1], lower[1], size, low[1], window[1])
+    if DIMENSIONS > 2:
+        z = bins_within(center[2], reach[2], lower[2], size, low[2], window[2])
+    for k in range(z[0], z[1]):
+        for j in range(y[0], y[1]):
+            row = k * strides[2] + j * strides[1]
+            if start[row + x[0]] < start[row + max(x[0], x[1])]:
+                return True
+    return False
+
+
+@helper
+def sum_particles(sums, x, radius, values, position, start, order, lower, size, low, window, strides):
+    """sums[:] = sum of values[p] W(|x - x_p|) over the particles p closer than `radius`, in the order of the search cells."""
+    for v in range(len(sums)):
+        sums[v] = 0.0
+    bx = bins_within(x[0], radius, lower[0], size, low[0], window[0])
+    by, bz = (0, 1), (0, 1)
+    if DIMENSIONS > 1:
+        by = bins_within(x[1], radius, lower[1], size, low[1], window[1])
+    if DIMENSIONS > 2:
+        bz = bins_within(x[2], radius, lower[2], size, low[2], window[2])
+    for k in range(bz[0], bz[1]):
+        for j in range(by[0], by[1]):
+            row = k * strides[2] + j * strides[1]
+            for n in range(start[row + bx[0]], start[row + bx[1]]):
+                p = order[n]
+                dx = tuple(x[d] - position[p, d] for d in static_range(DIMENSIONS))
+                distance2 = dot(dx, dx)
+                if distance2 < radius * radius:
+                    weight = immersed_weight(distance2, radius)
+                    for v in range(len(sums)):
+                        sums[v] += weight * values[p, v]
+
+
+# ---- regions ------------------------------------------------------------------------------------------------------------
+
+
+@driver
+def cover(
+    begin, end, kind, occupied, U, lost, radius, volume, position, start, order, lower, size, low, window, strides,
+    shape, spacing, origin, extent,
+):  # fmt: skip
+    """kind = COVERED where the particles' `volume` (n, 1) fills half of the kernel's ball of `radius`, FRESH where it did before.
+
+    occupied (blocks,): whether a block has cells that are not FLUID; without those and particles it is skipped.
+    lost (blocks, conserved): grows by what the cells that become covered hold per volume.
+    """
+    sums = workspace(1)
+    cells = shape[0] * shape[1] * shape[2]
+    for b in range(begin, end):
+        middle = tuple(lower[d] + (origin[b, d] + 0.5 * extent[b, d]) * spacing[d] for d in static_range(DIMENSIONS))
+        reach = tuple(0.5 * extent[b, d] * spacing[d] + radius for d in static_range(DIMENSIONS))
+        if occupied[b] == 0 and not any_particle(middle, reach, start, lower, size, low, window, strides):
+            continue
+        occupied[b] = 0
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    x = center_of(at, shape, lower, spacing, origin)
+                    sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
+                    before = kind[at]
+                    if sums[0] >= 0.5:
+                        kind[at] = COVERED
+                        if before < UNKNOWN:
+                            for v in range(PHASES + DIMENSIONS + 1):
+                                lost[b, v] += load(U, at + (b * (VARIABLES - 1) + v) * cells)
+                    else:
+                        kind[at] = FRESH if before >= COVERED else FLUID
+                    if kind[at] != FLUID:
+                        occupied[b] = 1
+
+
+@driver
+def find_depth(begin, end, kind, occupied, shape, extent, offsets, counts):
+    """Covered cells without fluid at `offsets` become DEEP; counts (blocks, 3) = the COVERED, DEEP and FRESH cells."""
+    for b in range(begin, end):
+        for c in range(3):
+            counts[b, c] = 0
+        if occupied[b] == 0:
+            continue
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    if kind[at] == FRESH:
+                        counts[b, 2] += 1
+                    elif kind[at] >= COVERED:
+                        deep = 1
+                        for m in range(len(offsets)):
+                            if kind[at + offsets[m]] < COVERED:
+                                deep = 0
+                                break
+                        counts[b, deep] += 1
+                        if deep == 1:
+                            kind[at] = DEEP
+
+
+@driver
+def list_cells(begin, end, kind, occupied, shape, extent, first, covered, deep, fresh):
+    """Write the cells of each kind, block by block, from the places first (blocks, 3) on."""
+    for b in range(begin, end):
+        if occupied[b] == 0:
+            continue
+        c, d, f = first[b, 0], first[b, 1], first[b, 2]
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    if kind[at] == COVERED:
+                        covered[c] = at
+                        c += 1
+                    elif kind[at] == DEEP:
+                        deep[d] = at
+                        d += 1
+                    elif kind[at] == FRESH:
+                        fresh[f] = at
+                        f += 1
+
+
+# ---- what the cells hold ------------------------------------------------------------------------------------------------
+
+
+@driver
+def find_wall_velocity(
+    begin, end, covered, velocity, inertia, radius, momentum, position, start, order, lower, size, low, window, strides,
+    shape, spacing, origin,
+):  # fmt: skip
+    """velocity (n, D) of the boundary in the covered cells: the particles' mean by mass and kernel (Eq. 31 with weights).
+
+    momentum (particles, 1 + D): mass and momentum; inertia (n,) = sum of mass times kernel.
+    """
+    sums = workspace(1 + DIMENSIONS)
+    for n in range(begin, end):
+        x = center_of(covered[n], shape, lower, spacing, origin)
+        sum_particles(sums, x, radius, momentum, position, start, order, lower, size, low, window, strides)
+        inertia[n] = sums[0]
+        for d in static_range(DIMENSIONS):
+            velocity[n, d] = sums[1 + d] / sums[0]
+
+
+@helper
+def mean_of_fluid(U, kind, at, cells, offsets, weights, rings, rest):
+    """Primitive state: weighted mean over the FLUID cells of the first ring around `at` that has any (Eq. 32), else `rest`."""
+    share = 0.0
+    total = tuple(0.0 for _ in static_range(VARIABLES))
+    for ring in range(len(rings) - 1):
+        if share == 0.0:
+            for m in range(rings[ring], rings[ring + 1]):
+                source = at + offsets[m]
+                if kind[source] == FLUID:
+                    first = source + source // cells * (VARIABLES - 1) * cells
+                    W = primitives(tuple(load(U, first + v * cells) for v in static_range(VARIABLES)))
+                    share += weights[m]
+                    total = tuple(total[v] + weights[m] * W[v] for v in static_range(VARIABLES))
+    found = share > 0.0
+    return tuple(total[v] / share if found else rest[v] for v in static_range(VARIABLES))
+
+
+@helper
+def put(U, at, cells, state):
+    """Store a conserved state."""
+    first = at + at // cells * (VARIABLES - 1) * cells
+    for v in static_range(VARIABLES):
+        store(U, first + v * cells, state[v])
+
+
+@driver
+def fill_covered(begin, end, covered, velocity, U, kind, shape, offsets, weights, rings, rest):
+    """Covered cells move with the wall; all else they take from the fluid around them."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        W = mean_of_fluid(U, kind, covered[n], cells, offsets, weights, rings, rest)
+        wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
+        put(U, covered[n], cells, conserved(moving_with(W, wall)))
+
+
+@driver
+def fill_fresh(begin, end, fresh, U, kind, shape, offsets, weights, rings, rest):
+    """Fresh cells take their whole state from the fluid around them."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        put(U, fresh[n], cells, conserved(mean_of_fluid(U, kind, fresh[n], cells, offsets, weights, rings, rest)))
+
+
+@driver
+def fill_deep(begin, end, deep, U, shape, rest):
+    """Deep cells rest."""
+    cells = shape[0] * shape[1] * shape[2]
+    state = conserved(tuple(rest[v] for v in static_range(VARIABLES)))
+    for n in range(begin, end):
+        put(U, deep[n], cells, state)
+
+
+# ---- what the fluid gives -----------------------------------------------------------------------------------------------
+
+
+@helper
+def add_flux(passed, n, U, at, cells, step, axis, weight, P, T, F):
+    """passed[n] += weight * flux through the face between the cells `at` and `at + step`, by the rows of the stage itself."""
+    first = at + at // cells * (VARIABLES - 1) * cells
+    for c in range(4):
+        primitives_row(U, P, first + (c - 1) * step, cells, c, 4, 1)
+    slopes_row(P, T, 1, 4, 1, 0, 2, 2)
+    flux_row(P, T, F, 1, 4, 1, 0, 1, 2, 0, axis, 1)
+    for v in range(PHASES + DIMENSIONS + 1):
+        passed[n, v] += weight * load(F, 2 * place(v, axis))
+
+
+@driver
+def collect_wall(begin, end, covered, passed, U, kind, shape, steps, weights):
+    """passed[n] (conserved) grows by what crosses the faces between covered cells and fluid ones.
+
+    weights (D,): share of the stage * dt * area of a face.
+    """
+    cells = shape[0] * shape[1] * shape[2]
+    P, T, F = workspace(4 * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    for n in range(begin, end):
+        at = covered[n]
+        for axis in range(DIMENSIONS):
+            step = steps[axis]
+            if kind[at - step] < COVERED:
+                add_flux(passed, n, U, at - step, cells, step, axis, weights[axis], P, T, F)
+            if kind[at + step] < COVERED:
+                add_flux(passed, n, U, at, cells, step, axis, -weights[axis], P, T, F)
+
+
+@driver
+def collect_sides(begin, end, side_cells, side, passed, U, kind, shape, steps, weights):
+    """passed[n] grows by what leaves through the domain's sides, side[n] = 2 axis + (0 low | 1 high), at covered cells."""
+    cells = shape[0] * shape[1] * shape[2]
+    P, T, F = workspace(4 * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    for n in range(begin, end):
+        at, axis = side_cells[n], side[n] // 2
+        if kind[at] >= COVERED:
+            high = side[n] % 2
+            before = at if high == 1 else at - steps[axis]
+            add_flux(passed, n, U, before, cells, steps[axis], axis, (2 * high - 1) * weights[axis], P, T, F)
+
+
+@driver
+def spread(begin, end, covered, passed, velocity, inertia, kick, shape):
+    """kick (blocks, D, Z, Y, X) = velocity that a particle gains from a covered cell per kernel value [m^(d+1)/s]."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        amounts = tuple(passed[n, v] for v in static_range(PHASES + DIMENSIONS + 1))
+        J = impulse_on_wall(amounts, tuple(velocity[n, d] for d in static_range(DIMENSIONS)))
+        at = covered[n] + covered[n] // cells * (DIMENSIONS - 1) * cells
+        for d in static_range(DIMENSIONS):
+            store(kick, at + d * cells, J[d] / inertia[n])
+
+
+@helper
+def cells_within(x, radius, lower, spacing, first, end):
+    """First and past-the-end cell along one axis whose centers are within `radius` of x, inside first … end."""
+    low = int(floor((x - radius - lower) / spacing + 0.5))
+    high = int(floor((x + radius - lower) / spacing - 0.5))
+    return (max(low, first), min(high + 1, end))
+
+
+@driver
+def push(
+    begin, end, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, open_cells,
+    grid_cells, block_cells, curve_index, first_block,
+):  # fmt: skip
+    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around a particle; home[p] = its local block.
+
+    open_cells (3, 2): first and past-the-end cell of the grid and of its images at symmetry planes.
+    """
+    cells = shape[0] * shape[1] * shape[2]
+    for p in range(begin, end):
+        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
+        own = tuple(
+            max(min(int(floor((x[d] - lower[d]) / spacing[d])), grid_cells[d] - 1), 0) // block_cells[d]
+            for d in static_range(DIMENSIONS)
+        )
+        y_place = own[1] if DIMENSIONS > 1 else 0
+        z_place = own[2] if DIMENSIONS > 2 else 0
+        b = curve_index[own[0], y_place, z_place] - first_block
+        home[p] = b
+        ranges = tuple(
+            cells_within(
+                x[d],
+                radius,
+                lower[d],
+                spacing[d],
+                max(origin[b, d] - 2, open_cells[d, 0]),
+                min(origin[b, d] + extent[b, d] + 2, open_cells[d, 1]),
+            )
+            for d in static_range(DIMENSIONS)
+        )
+        by, bz = (0, 1), (0, 1)
+        if DIMENSIONS > 1:
+            by = ranges[1]
+        if DIMENSIONS > 2:
+            bz = ranges[2]
+        total = tuple(0.0 for _ in static_range(DIMENSIONS))
+        for k in range(bz[0], bz[1]):
+            for j in range(by[0], by[1]):
+                for i in range(ranges[0][0], ranges[0][1]):
+                    at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
+                    first = at + b * (DIMENSIONS - 1) * cells
+                    given = tuple(load(kick, first + d * cells) for d in static_range(DIMENSIONS))
+                    if dot(given, given) > 0.0:
+                        c = center_of(at, shape, lower, spacing, origin)
+                        dx = tuple(c[d] - x[d] for d in static_range(DIMENSIONS))
+                        if dot(dx, dx) < radius * radius:
+                            weight = mass[p] * immersed_weight(dot(dx, dx), radius)
+                            total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))
+        for d in static_range(DIMENSIONS):
+            impulse[p, d] = total[d]

@@ -1,0 +1,235 @@
+"""Loops of the fluid: one fused Runge-Kutta stage over tiles, and the fastest signal of each block.
+
+A tile is computed row by row (x fastest), so that its working set stays in the cache:
+
+    primitives of the tile and its ghosts -> P
+    for each row:  slopes and fluxes along x; along y and z those of the row above roll forward
+                   divergence, Runge-Kutta update and relaxation -> U_new
+
+P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes hold px values per variable. Flux rows have their velocity
+components rotated so that the normal one comes first.
+"""
+
+from distfsi.device.markers import driver, helper, load, row, store, workspace
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import (
+    DIMENSIONS,
+    FLUXES,
+    PHASES,
+    VARIABLES,
+    face_flux,
+    limited_slope,
+    primitives,
+    sound_speed,
+    updated,
+)
+
+# columns of the tile table: the block, the first cell (counted with ghosts), the cells, which domain sides the tile touches (bits)
+BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES = 0, 1, 2, 3, 4, 5, 6, 7
+
+
+@helper
+def rotated(v, axis):
+    """Index of the variable that stands at place v when the velocity along `axis` comes first."""
+    if v >= PHASES and v < PHASES + DIMENSIONS:
+        return PHASES + (v - PHASES + axis) % DIMENSIONS
+    return v
+
+
+@helper
+def place(v, axis):
+    """Where variable v stands when the velocity along `axis` comes first."""
+    if v >= PHASES and v < PHASES + DIMENSIONS:
+        return PHASES + (v - PHASES + DIMENSIONS - axis) % DIMENSIONS
+    return v
+
+
+@row
+def primitives_row(U, P, u, su, p, sp, n):
+    """P[p …] = primitives of the n cells at U[u …]; variables are su and sp apart."""
+    for i in range(n):
+        W = primitives(tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)))
+        for v in static_range(VARIABLES):
+            store(P, p + v * sp + i, W[v])
+
+
+@row
+def slopes_row(P, T, p, sp, step, t, st, n):
+    """T[t …] = half the limited slope of each primitive along the axis whose cells are `step` apart."""
+    for v in static_range(VARIABLES):
+        for i in range(n):
+            c = p + v * sp + i
+            here = load(P, c)
+            store(T, t + v * st + i, 0.5 * limited_slope(here - load(P, c - step), load(P, c + step) - here))
+
+
+@row
+def flux_row(P, T, F, p, sp, step, t_low, t_high, st, f, axis, n):
+    """F[f …] = flux through the faces between the n cells at P[p …] and those `step` further along `axis`."""
+    for i in range(n):
+        left = tuple(
+            load(P, p + rotated(v, axis) * sp + i) + load(T, t_low + rotated(v, axis) * st + i)
+            for v in static_range(VARIABLES)
+        )
+        right = tuple(
+            load(P, p + step + rotated(v, axis) * sp + i) - load(T, t_high + rotated(v, axis) * st + i)
+            for v in static_range(VARIABLES)
+        )
+        flux = face_flux(left, right)
+        for v in static_range(FLUXES):
+            store(F, f + v * st + i, flux[v])
+
+
+@helper
+def divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz):
+    """dt times the flux divergence of variable v in cell i of a row."""
+    total = (load(F, fx + v * st + i + 1) - load(F, fx + v * st + i)) * cx
+    if DIMENSIONS > 1:
+        w = place(v, 1) * st + i
+        total = total + (load(F, fy_high + w) - load(F, fy_low + w)) * cy
+    if DIMENSIONS > 2:
+        w = place(v, 2) * st + i
+        total = total + (load(F, fz_high + w) - load(F, fz_low + w)) * cz
+    return total
+
+
+@row
+def update_row(U_n, U, P, F, U_new, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz, b, dt, n):
+    """U_new = one Runge-Kutta stage of the n cells at U[u …]."""
+    for i in range(n):
+        new = updated(
+            tuple(load(U_n, u + v * su + i) for v in static_range(VARIABLES)),
+            tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)),
+            tuple(load(P, p + v * sp + i) for v in static_range(VARIABLES)),
+            tuple(
+                divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz) for v in static_range(FLUXES)
+            ),
+            b,
+            dt,
+        )
+        for v in static_range(VARIABLES):
+            store(U_new, u + v * su + i, new[v])
+
+
+@helper
+def book(through, t, side, F, f, st, axis, n, weight):
+    """Add the flux through n faces of a domain side to what has left through it."""
+    for v in static_range(PHASES + DIMENSIONS + 1):
+        total = load(F, f + place(v, axis) * st)
+        for i in range(1, n):
+            total = total + load(F, f + place(v, axis) * st + i)
+        through[t, side, v] += total * weight
+
+
+@driver
+def advance_tiles(begin, end, chosen, tiles, U_n, U, U_new, through, b, dt, weight, cx, cy, cz, px, py, pz):
+    """One Runge-Kutta stage of the tiles chosen[begin:end].
+
+    U_n, U, U_new: (blocks, VARIABLES, Z, Y, X), the state before the step, of this stage and after it; U_n may be U.
+    through (tiles, 6, conserved): grows by weight * dt/h * flux at the domain's sides. cx, cy, cz: dt/h per axis.
+    """
+    sy = U.shape[4]
+    sz = sy * U.shape[3]
+    su = sz * U.shape[2]
+    sp = px * py * pz
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    slopes, fluxes = VARIABLES * px, FLUXES * px
+    P = workspace(VARIABLES * sp)
+    T = workspace((3 + 2 * py) * slopes)
+    F = workspace((3 + 2 * py) * fluxes)
+    for at in range(begin, end):
+        t = chosen[at]
+        n, m, l, sides = tiles[t, NX], tiles[t, NY], tiles[t, NZ], tiles[t, SIDES]
+        u0 = tiles[t, BLOCK] * VARIABLES * su + tiles[t, Z0] * sz + tiles[t, Y0] * sy + tiles[t, X0]
+        for k in range(-gz, l + gz):
+            for j in range(-gy, m + gy):
+                if (j >= 0 and j < m) or (k >= 0 and k < l):
+                    primitives_row(U, P, u0 + k * sz + j * sy - 2, su, ((k + gz) * py + j + gy) * px, sp, n + 4)
+        tx, fx = 0, 0
+        ty, ty_next = slopes, 2 * slopes
+        fy, fy_next = fluxes, 2 * fluxes
+        if DIMENSIONS > 2:
+            for j in range(m):
+                c = (gz * py + j + gy) * px + 2
+                tz, tz_next, fz = (3 + j) * slopes, (3 + py + j) * slopes, (3 + j) * fluxes
+                slopes_row(P, T, c - px * py, sp, px * py, tz_next, px, n)
+                slopes_row(P, T, c, sp, px * py, tz, px, n)
+                flux_row(P, T, F, c - px * py, sp, px * py, tz_next, tz, px, fz, 2, n)
+                if sides & 16:
+                    book(through, t, 4, F, fz, px, 2, n, weight * cz)
+        for k in range(l):
+            now, then = (3 + py * (k % 2)), (3 + py * ((k + 1) % 2))
+            if DIMENSIONS > 1:
+                c = ((k + gz) * py + gy) * px + 2
+                slopes_row(P, T, c - px, sp, px, ty_next, px, n)
+                slopes_row(P, T, c, sp, px, ty, px, n)
+                flux_row(P, T, F, c - px, sp, px, ty_next, ty, px, fy, 1, n)
+                if sides & 4:
+                    book(through, t, 2, F, fy, px, 1, n, weight * cy)
+            for j in range(m):
+                c = ((k + gz) * py + j + gy) * px + 2
+                slopes_row(P, T, c - 1, sp, 1, tx, px, n + 2)
+                flux_row(P, T, F, c - 1, sp, 1, tx, tx + 1, px, fx, 0, n + 1)
+                if DIMENSIONS > 1:
+                    slopes_row(P, T, c + px, sp, px, ty_next, px, n)
+                    flux_row(P, T, F, c, sp, px, ty, ty_next, px, fy_next, 1, n)
+                if DIMENSIONS > 2:
+                    slopes_row(P, T, c + px * py, sp, px * py, (then + j) * slopes, px, n)
+                    flux_row(
+                        P, T, F, c, sp, px * py, (now + j) * slopes, (then + j) * slopes, px, (then + j) * fluxes, 2, n
+                    )
+                u = u0 + k * sz + j * sy
+                fz_low, fz_high = (now + j) * fluxes, (then + j) * fluxes
+                update_row(
+                    U_n, U, P, F, U_new, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high, cx, cy, cz, b, dt, n
+                )
+                if sides & 1:
+                    book(through, t, 0, F, fx, px, 0, 1, weight * cx)
+                if sides & 2:
+                    book(through, t, 1, F, fx + n, px, 0, 1, weight * cx)
+                if DIMENSIONS > 1 and sides & 8 and j == m - 1:
+                    book(through, t, 3, F, fy_next, px, 1, n, weight * cy)
+                if DIMENSIONS > 2 and sides & 32 and k == l - 1:
+                    book(through, t, 5, F, fz_high, px, 2, n, weight * cz)
+                ty, ty_next = ty_next, ty
+                fy, fy_next = fy_next, fy
+
+
+@row
+def signal_row(U, S, u, su, n, rx, ry, rz):
+    """S[i] = sum over axes of (|u| + c)/h, largest so far in column i; S[n + i] stays 0 as long as every signal is finite."""
+    for i in range(n):
+        W = primitives(tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)))
+        c = sound_speed(W)
+        signal = (abs(W[PHASES]) + c) * rx
+        if DIMENSIONS > 1:
+            signal = signal + (abs(W[PHASES + 1]) + c) * ry
+        if DIMENSIONS > 2:
+            signal = signal + (abs(W[PHASES + 2]) + c) * rz
+        store(S, i, max(load(S, i), signal))
+        store(S, n + i, load(S, n + i) + (signal - signal))
+
+
+@driver
+def fastest_signals(begin, end, U, start, extent, rx, ry, rz, fastest):
+    """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s]; NaN when a cell is not finite.
+
+    start: index of a block's first active cell within one variable; rx, ry, rz: 1/h.
+    """
+    sy = U.shape[4]
+    sz = sy * U.shape[3]
+    su = sz * U.shape[2]
+    S = workspace(2 * sy)
+    for block in range(begin, end):
+        n = extent[block, 0]
+        for i in range(2 * n):
+            S[i] = 0.0
+        for k in range(extent[block, 2]):
+            for j in range(extent[block, 1]):
+                signal_row(U, S, block * VARIABLES * su + start + k * sz + j * sy, su, n, rx, ry, rz)
+        largest = S[0] + S[n]
+        for i in range(1, n):
+            signal = S[i] + S[n + i]
+            largest = largest if signal <= largest else signal
+        fastest[block] = largest

@@ -1,0 +1,213 @@
+"""Loops of the solid: neighbour search, forces, and the update of the particles.
+
+`position` (count, DIMENSIONS) and `state` (count, columns below) hold a rank's own particles first, then its ghosts and
+images. All sums gather: the neighbours of a particle are visited in one order on any number of ranks and threads.
+"""
+
+from math import floor
+
+from distfsi.device.markers import driver, helper
+from distfsi.physics.pair import (
+    approach_speed,
+    pair_acceleration,
+    pair_gradient,
+    pair_heating,
+    stable_time,
+    viscosity,
+)
+from distfsi.physics.smoothing import dilated, smoothing_slope
+from distfsi.physics.solid_eos import bulk_modulus, solid_pressure, solid_sound_speed
+from distfsi.physics.strength import plastic_heating, plastic_increment, trial_deviator, von_mises, yield_stress
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
+from distfsi.physics.tensors import dot, trace
+
+MASS, DENSITY, SMOOTHING, PRESSURE, SOUND_SPEED, VELOCITY = range(
+    6
+)  # columns of `state`; the deviator follows the velocity
+EOS_CONSTANTS, STRENGTH_CONSTANTS = 9, 11  # columns of the material tables
+
+# ---- neighbour search -----------------------------------------------------------------------------------------------
+
+
+@driver
+def find_cells(begin, end, position, lower, size, low, high, strides, cell):
+    """cell[i] = search cell of each particle within the window low … high; those beyond go to its outermost cells."""
+    for i in range(begin, end):
+        index = 0
+        for d in static_range(DIMENSIONS):
+            place = floor((position[i, d] - lower[d]) / size)
+            index += (1 + int(max(min(place, high[d]), low[d]) - low[d])) * strides[d]
+        cell[i] = index
+
+
+@driver
+def fill_cells(cell, start, order):
+    """Counting sort: order[start[c] … start[c + 1]] = the particles of search cell c; `start` is zero on entry."""
+    for i in range(len(cell)):
+        start[cell[i] + 1] += 1
+    for c in range(1, len(start)):
+        start[c] += start[c - 1]
+    for i in range(len(cell)):
+        c = cell[i]
+        order[start[c]] = i
+        start[c] += 1
+    for c in range(len(start) - 1, 0, -1):
+        start[c] = start[c - 1]
+    start[0] = 0
+
+
+@driver
+def order_cells(begin, end, start, order, key):
+    """Sort the particles of each search cell by their key; they are almost sorted."""
+    for c in range(begin, end):
+        for n in range(start[c] + 1, start[c + 1]):
+            particle, m = order[n], n
+            while m > start[c] and key[order[m - 1]] > key[particle]:
+                order[m] = order[m - 1]
+                m -= 1
+            order[m] = particle
+
+
+@driver
+def find_neighbours(begin, end, position, state, cell, start, order, strips, neighbours, neighbour_count):
+    """neighbours[i] = all particles closer than 2 h_ij, cell by cell in the order of their keys.
+
+    `strips` are the offsets of the rows of three cells around a cell. The count may exceed the table's width; then the
+    table is not complete.
+    """
+    for i in range(begin, end):
+        found = 0
+        for strip in range(len(strips)):
+            c = cell[i] + strips[strip]
+            for n in range(start[c - 1], start[c + 2]):
+                j = order[n]
+                reach = state[i, SMOOTHING] + state[j, SMOOTHING]
+                dx = difference(position, 0, i, j)
+                if dot(dx, dx) < reach * reach and j != i:
+                    if found < neighbours.shape[1]:
+                        neighbours[i, found] = j
+                    found += 1
+        neighbour_count[i] = found
+
+
+# ---- pairs ---------------------------------------------------------------------------------------------------------
+
+
+@helper
+def difference(A, column, i, j):
+    """Vector of A[i] minus that of A[j]."""
+    return tuple(A[i, column + d] - A[j, column + d] for d in static_range(DIMENSIONS))
+
+
+@helper
+def deviator_of(state, i):
+    """Deviatoric stress of a particle."""
+    return tuple(state[i, VELOCITY + DIMENSIONS + c] for c in static_range(COMPONENTS))
+
+
+@helper
+def pair_geometry(position, state, i, j):
+    """dx, slope of W, approach speed and Monaghan's Pi of a pair."""
+    dx = difference(position, 0, i, j)
+    distance2 = dot(dx, dx)
+    h = 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING])
+    approach = approach_speed(difference(state, VELOCITY, i, j), dx, distance2, h)
+    mean_sound = 0.5 * (state[i, SOUND_SPEED] + state[j, SOUND_SPEED])
+    mean_density = 0.5 * (state[i, DENSITY] + state[j, DENSITY])
+    return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, mean_sound, mean_density))
+
+
+@driver
+def accelerate(begin, end, position, state, neighbours, neighbour_count, acceleration, limits):
+    """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow."""
+    for i in range(begin, end):
+        total = tuple(0.0 for _ in static_range(DIMENSIONS))
+        fastest = 0.0
+        own = deviator_of(state, i)
+        for n in range(neighbour_count[i]):
+            j = neighbours[i, n]
+            dx, slope, approach, Pi = pair_geometry(position, state, i, j)
+            other = deviator_of(state, j)
+            pull = pair_acceleration(
+                dx,
+                slope,
+                tuple(own[c] + other[c] for c in static_range(COMPONENTS)),
+                state[i, PRESSURE] + state[j, PRESSURE],
+                state[i, DENSITY] * state[j, DENSITY],
+                Pi,
+            )
+            total = tuple(total[d] + state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
+            fastest = max(fastest, approach)
+        for d in static_range(DIMENSIONS):
+            acceleration[i, d] = total[d]
+        limits[i, 0], limits[i, 1] = stable_time(state[i, SMOOTHING], state[i, SOUND_SPEED], fastest, total)
+
+
+# ---- update --------------------------------------------------------------------------------------------------------
+
+
+@driver
+def heat(begin, end, position, state, neighbours, neighbour_count, dt, velocity, energy, gradient):
+    """Advance the energy (Eq. 5c) and find the velocity gradient; `velocity` is the new one, of all particles.
+
+    The energy takes the mean of the old and the new velocities, so that kinetic and internal energy exchange exactly.
+    """
+    for i in range(begin, end):
+        power = 0.0
+        total = tuple(tuple(0.0 for _ in static_range(DIMENSIONS)) for _ in static_range(DIMENSIONS))
+        own = deviator_of(state, i)
+        for n in range(neighbour_count[i]):
+            j = neighbours[i, n]
+            dx, slope, approach, Pi = pair_geometry(position, state, i, j)
+            before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
+            power += state[j, MASS] * pair_heating(
+                tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS)),
+                dx,
+                slope,
+                own,
+                state[i, PRESSURE] + state[j, PRESSURE],
+                state[i, DENSITY] * state[j, DENSITY],
+                Pi,
+            )
+            part = pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY])
+            total = tuple(
+                tuple(total[a][b] + part[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
+            )
+        energy[i] += dt * power
+        for a in static_range(DIMENSIONS):
+            for b in static_range(DIMENSIONS):
+                gradient[i, a * DIMENSIONS + b] = total[a][b]
+
+
+@driver
+def deform(
+    begin, end, dt, gradient, body, eos, strength, energy, density, h, deviator, strain, temperature, pressure, sound
+):
+    """Advance density, smoothing length, stress, plastic strain and temperature by `dt` of the velocity gradient.
+
+    `eos` and `strength` hold one row of constants per body.
+    """
+    for i in range(begin, end):
+        rates = tuple(
+            tuple(gradient[i, a * DIMENSIONS + b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
+        )
+        law = tuple(eos[body[i], k] for k in static_range(EOS_CONSTANTS))
+        metal = tuple(strength[body[i], k] for k in static_range(STRENGTH_CONSTANTS))
+        density[i], h[i] = dilated(density[i], h[i], trace(rates), dt)
+
+        stress = trial_deviator(tuple(deviator[i, c] for c in static_range(COMPONENTS)), rates, metal[0], dt)
+        trial = von_mises(stress)
+        scale = 1.0
+        if trial > yield_stress(strain[i], 0.0, temperature[i], metal):
+            increment = plastic_increment(trial, strain[i], temperature[i], dt, metal)
+            flow = trial - 3.0 * metal[0] * increment
+            scale = flow / trial
+            strain[i] += increment
+            temperature[i] += plastic_heating(increment, flow, density[i], metal)
+        for c in static_range(COMPONENTS):
+            deviator[i, c] = scale * stress[c]
+
+        pressure[i] = solid_pressure(density[i], energy[i], law)
+        bulk = bulk_modulus(density[i], energy[i], pressure[i], law)
+        sound[i] = solid_sound_speed(density[i], bulk, metal[0], law)

@@ -1,0 +1,136 @@
+"""The grid of cells and its cut into blocks: their order, their owners, their places in memory.
+
+Index axes are x, y, z in this order everywhere except in array shapes, where x is last and fastest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.curve import deal, morton_keys
+
+GHOSTS = 2  # layers of ghost cells on each side of every used axis
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Equal cells of size `spacing` [m] from the corner `lower` [m]; always three axes.
+
+    An unused axis has one cell, spacing 1, no ghosts and the boundary kinds ("none", "none").
+    """
+
+    dimensions: int
+    cells: tuple[int, int, int]
+    lower: tuple[float, float, float]
+    spacing: tuple[float, float, float]
+    boundaries: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, lower: tuple, upper: tuple, cells: tuple, boundaries: tuple) -> Grid:
+        """The grid with the given values for each of its 1 to 3 dimensions."""
+        unused = 3 - len(cells)
+        return cls(
+            dimensions=len(cells),
+            cells=(*cells, *[1] * unused),
+            lower=(*lower, *[0.0] * unused),
+            spacing=(*((b - a) / n for a, b, n in zip(lower, upper, cells, strict=True)), *[1.0] * unused),
+            boundaries=(*(tuple(pair) for pair in boundaries), *[("none", "none")] * unused),
+        )
+
+    @property
+    def ghosts(self) -> tuple[int, int, int]:
+        """Ghost layers on each side of x, y, z."""
+        return tuple(GHOSTS if axis < self.dimensions else 0 for axis in range(3))
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """The corner opposite to `lower` [m]."""
+        return tuple(a + n * h for a, n, h in zip(self.lower, self.cells, self.spacing, strict=True))
+
+
+class Blocks:
+    """The blocks of a grid in the order of a Morton curve, and which of them this rank owns.
+
+    grid, communicator
+    block_cells     cells of a whole block along x, y, z
+    along           blocks along x, y, z
+    count           number of all blocks
+    coordinates     (count, 3) place of each block among the blocks
+    curve_index     (along x, along y, along z) the inverse of `coordinates`
+    owners          (count,) rank of each block; ascending
+    first           curve index of this rank's first block
+    local_count     number of this rank's blocks
+    origin          (local_count, 3) global index of the first active cell
+    extent          (local_count, 3) active cells; fewer than block_cells at the high ends of the grid
+    shape           (Z, Y, X) of a block in memory, ghosts included
+    """
+
+    def __init__(
+        self, grid: Grid, block_cells: tuple[int, ...], communicator: Communicator, costs: np.ndarray | None = None
+    ) -> None:
+        """`block_cells` per used axis; `costs` (count,) in curve order, by default the number of active cells."""
+        self.grid = grid
+        self.communicator = communicator
+        cells = np.array(grid.cells)
+        wanted = np.ones(3, dtype=np.int64)
+        wanted[: grid.dimensions] = block_cells
+        self.block_cells = tuple(np.minimum(wanted, cells).tolist())
+        self.along = tuple((-(-cells // self.block_cells)).tolist())
+        self.count = int(np.prod(self.along))
+
+        coordinates = np.stack(np.unravel_index(np.arange(self.count), self.along), axis=1)
+        self.coordinates = coordinates[np.argsort(morton_keys(coordinates))]
+        self.curve_index = np.empty(self.along, dtype=np.int64)
+        self.curve_index[tuple(self.coordinates.T)] = np.arange(self.count)
+
+        origin = self.coordinates * self.block_cells
+        extent = np.minimum(self.block_cells, cells - origin)
+        self.owners = deal(extent.prod(axis=1) if costs is None else costs, communicator.size)
+        self.first, end = np.searchsorted(self.owners, [communicator.rank, communicator.rank + 1]).tolist()
+        self.local_count = end - self.first
+        self.origin = origin[self.first : end]
+        self.extent = extent[self.first : end]
+        self.shape = tuple(n + 2 * g for n, g in zip(self.block_cells[::-1], grid.ghosts[::-1], strict=True))
+
+    def allocate(self, variables: int, dtype: type = np.float64) -> np.ndarray:
+        """A field of zeros (local_count, variables, Z, Y, X)."""
+        return np.zeros((self.local_count, variables, *self.shape), dtype=dtype)
+
+    def coordinates_of(self, positions: np.ndarray) -> np.ndarray:
+        """Coordinates (n, 3) of the block that each of `positions` (n, dimensions) [m] is in or, outside, nearest to.
+
+        Each coordinate is a non-decreasing function of the position along its axis, to the last bit.
+        """
+        coordinates = np.zeros((3, len(positions)), dtype=np.int64)  # an axis at a time is several times faster
+        for axis in range(self.grid.dimensions):
+            cell = np.floor((positions[:, axis] - self.grid.lower[axis]) / self.grid.spacing[axis])
+            # fmin and fmax send a NaN to the last block, where np.clip would keep it and break the index.
+            inside = np.fmax(np.fmin(cell, self.grid.cells[axis] - 1), 0)
+            coordinates[axis] = inside.astype(np.int64) // self.block_cells[axis]
+        return coordinates.T
+
+    def block_of(self, positions: np.ndarray) -> np.ndarray:
+        """Curve index (n,) of the block that each of `positions` (n, dimensions) [m] is in or, outside, nearest to."""
+        return self.index_at(self.coordinates_of(positions))
+
+    def index_at(self, coordinates: np.ndarray) -> np.ndarray:
+        """Curve index (n,) of the blocks at `coordinates` (n, 3)."""
+        return self.curve_index[tuple(coordinates.T)]
+
+    def sum(self, values: np.ndarray) -> np.ndarray:
+        """Total (k,) float64 of this and all other ranks' `values` (local_count, k) per block, added in block order."""
+        everything = self.communicator.concatenate(np.asarray(values, dtype=np.float64))
+        # np.sum adds in pairs; accumulate adds one by one.
+        return np.add.accumulate(everything, axis=0)[-1]
+
+    def cell_centers(self, block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates x, y, z [m] of the centers of the active cells of local block `block`, one array per axis."""
+        return tuple(
+            low + (start + np.arange(number) + 0.5) * h
+            for low, h, start, number in zip(
+                self.grid.lower, self.grid.spacing, self.origin[block], self.extent[block], strict=True
+            )
+        )

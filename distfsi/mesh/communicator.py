@@ -1,0 +1,103 @@
+"""The ranks of a run: who they are, what they tell each other, and how one that fails takes the others down."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from distfsi.errors import InputError
+
+# What launchers tell their processes about the number of ranks (MPICH and Intel MPI, Open MPI, srun).
+LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+
+
+class Communicator:
+    """All ranks of the run. Every method except `abort` is collective: all ranks call it, in the same order.
+
+    `world` is the MPI communicator, for the other modules of this folder only.
+    """
+
+    def __init__(self) -> None:
+        self.world = MPI.COMM_WORLD
+        self.rank = self.world.Get_rank()
+        self.size = self.world.Get_size()
+        node = self.world.Split_type(MPI.COMM_TYPE_SHARED)
+        self.local_rank = node.Get_rank()
+        self.local_size = node.Get_size()
+        node.Free()
+        self.library = " ".join(MPI.Get_library_version().splitlines()[0].split(",")[0].split())
+
+    def barrier(self) -> None:
+        """Wait for all ranks."""
+        self.world.Barrier()
+
+    def broadcast(self, value: object) -> object:
+        """The (pickled) value of rank 0, on every rank."""
+        return self.world.bcast(value)
+
+    def allgather(self, value: object) -> list:
+        """The (pickled) values of all ranks in rank order, on every rank."""
+        return self.world.allgather(value)
+
+    def concatenate(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (n, ...) of all ranks in rank order, on every rank; n may differ, dtype and row shape may not."""
+        rows = np.ascontiguousarray(rows)
+        counts = np.empty(self.size, dtype=np.int64)
+        self.world.Allgather(np.array([rows.nbytes], dtype=np.int64), counts)
+        everything = np.empty(counts.sum(), dtype=np.uint8)
+        self.world.Allgatherv([rows.reshape(-1).view(np.uint8), MPI.BYTE], [everything, counts, None, MPI.BYTE])
+        return everything.view(rows.dtype).reshape(-1, *rows.shape[1:])
+
+    def maximum(self, values: np.ndarray) -> np.ndarray:
+        """Element-wise largest float64 values over all ranks; a NaN on any rank comes out as inf."""
+        values = np.asarray(values, dtype=np.float64)
+        # MPI leaves open what MAX makes of a NaN; a comparison may drop it.
+        values = np.where(np.isnan(values), np.inf, values)
+        largest = np.empty_like(values)
+        self.world.Allreduce(values, largest, MPI.MAX)
+        return largest
+
+    def write_at(self, path: str, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
+        """Write this rank's C-contiguous `arrays` (maybe none) at its byte `offsets` into the existing file `path`.
+
+        The data is on disk when this returns. Raises mpi4py.MPI.Exception when the file cannot be opened or written.
+        """
+        file = MPI.File.Open(self.world, os.fspath(path), MPI.MODE_WRONLY)
+        for offset, array in zip(offsets, arrays, strict=True):
+            file.Write_at(offset, [array.reshape(-1).view(np.uint8), MPI.BYTE])
+        file.Sync()
+        file.Close()
+
+    def abort(self, code: int) -> None:
+        """End all ranks at once; the launcher returns `code` where it can."""
+        self.world.Abort(code)
+
+
+def install_abort_on_exception(communicator: Communicator) -> None:
+    """From now on an uncaught exception on one rank ends all ranks, with the exception's `exit_code` (default 1)."""
+
+    def report_and_abort(kind, error, trace) -> None:
+        lines = "".join(traceback.format_exception(kind, error, trace))
+        print(f"rank {communicator.rank}: {lines}", file=sys.stderr)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        communicator.abort(getattr(error, "exit_code", 1))
+
+    sys.excepthook = report_and_abort
+
+
+def check_launcher(communicator: Communicator) -> None:
+    """Raise InputError when a launcher started several ranks that MPI sees as separate runs of one rank each."""
+    if communicator.size > 1:
+        return
+    for name in LAUNCHER_SIZES:
+        started = int(os.environ.get(name, 1))
+        if started > 1:
+            fault = f"the launcher started {started} ranks ({name}), but each runs alone with {communicator.library}"
+            remedy = f"use the mpiexec that belongs to this library, or the one in {sys.prefix}/bin"
+            raise InputError([f"{fault}: launcher and MPI library do not match; {remedy}"])

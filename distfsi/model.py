@@ -1,0 +1,114 @@
+"""From the words of a scene to formulas: the only place where a name in the input meets a function.
+
+A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one description in scene/.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import singledispatch
+
+import numpy as np
+
+from distfsi.device.emit import plain
+from distfsi.device.fold import Bound
+from distfsi.physics import euler, limiters, two_phase
+from distfsi.physics.eos import jwl, stiffened_gas
+from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
+
+LIMITERS = {"first_order": limiters.first_order, "minmod": limiters.minmod, "van_leer": limiters.van_leer}
+MODELS = {1: euler, 2: two_phase}
+
+
+@dataclass(frozen=True)
+class FluidEos:
+    """p = reference(rho) + omega rho e, as a formula with its constants."""
+
+    reference: Bound
+    omega: float
+    closed_form: bool
+
+    def evaluate(self, rho: float) -> tuple[float, float]:
+        """Reference pressure [Pa] and its slope with density, outside the kernels."""
+        return plain(self.reference.function, self.reference.constants)(rho)
+
+
+@singledispatch
+def fluid_eos(eos: object) -> FluidEos:
+    """The formula of an equation of state of the input."""
+    raise TypeError(f"no formula for {eos}")
+
+
+@fluid_eos.register
+def _(eos: IdealGas) -> FluidEos:
+    return fluid_eos(StiffenedGas(eos.gamma, 0.0))
+
+
+@fluid_eos.register
+def _(eos: StiffenedGas) -> FluidEos:
+    return FluidEos(Bound(stiffened_gas.reference, {"GAMMA": eos.gamma, "P_INF": eos.p_inf}), eos.gamma - 1.0, True)
+
+
+@fluid_eos.register
+def _(eos: Jwl) -> FluidEos:
+    constants = {"RHO0": eos.rho0, "A": eos.A, "B": eos.B, "R1": eos.R1, "R2": eos.R2, "OMEGA": eos.omega}
+    return FluidEos(Bound(jwl.reference, constants), eos.omega, False)
+
+
+@dataclass(frozen=True)
+class FluidModel:
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables.
+
+    mirror: per variable the axis whose reflection changes its sign, -1 for none.
+    """
+
+    constants: dict[str, object]
+    bindings: dict[str, Bound]
+    eos: tuple[FluidEos, ...]
+    dimensions: int
+
+    @property
+    def phases(self) -> int:
+        return len(self.eos)
+
+    @property
+    def variables(self) -> int:
+        return self.constants["VARIABLES"]
+
+    @property
+    def conserved(self) -> int:
+        """Masses, momentum and energy; the volume fraction behind them is not conserved."""
+        return self.phases + self.dimensions + 1
+
+    @property
+    def mirror(self) -> np.ndarray:
+        axes = np.full(self.variables, -1, dtype=np.int64)
+        axes[self.phases : self.phases + self.dimensions] = np.arange(self.dimensions)
+        return axes
+
+    def formula(self, name: str):
+        """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
+        return plain(self.bindings[name].function, self.constants, self.bindings)
+
+
+def fluid_model(scene: Scene) -> FluidModel:
+    """The formulas and constants of the scene's fluid."""
+    fluid: Fluid = scene.fluid
+    dimensions, phases = scene.domain.dimensions, len(fluid.phases)
+    eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
+    variables = phases + dimensions + 1 + (phases == 2)
+    constants = {
+        "DIMENSIONS": dimensions,
+        "PHASES": phases,
+        "VARIABLES": variables,
+        "FLUXES": variables + (3 if phases == 2 else 0),
+        "GRAVITY": scene.gravity,
+        "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
+        "CLOSED_FORM": all(e.closed_form for e in eos),
+    } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
+    model = MODELS[phases]
+    names = ("primitives", "conserved", "face_flux", "updated", "sound_speed")
+    bindings = {name: Bound(getattr(model, name)) for name in names}
+    bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
+    bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
+    return FluidModel(constants, bindings, eos, dimensions)

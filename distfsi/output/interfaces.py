@@ -1,0 +1,41 @@
+"""What the output needs to know of the ranks and of the cut of the domain; `distfsi.mesh` provides both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+
+class Communicator(Protocol):
+    """The ranks of the run."""
+
+    rank: int
+
+    def broadcast(self, value: Any) -> Any:
+        """Rank 0's `value` on every rank."""
+
+    def allgather(self, value: Any) -> list:
+        """The values of all ranks, by rank, on every rank."""
+
+    def write_at(self, path: Path, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
+        """Collective: write each of this rank's arrays at its byte offset of an existing file, and sync it."""
+
+
+class Grid(Protocol):
+    """The cells of the domain; x, y, z in this order, one cell on unused axes."""
+
+    dimensions: int
+    cells: tuple[int, int, int]
+    lower: tuple[float, float, float]
+    spacing: tuple[float, float, float]
+
+
+class Blocks(Protocol):
+    """The blocks that the domain is cut into."""
+
+    grid: Grid
+    block_cells: tuple[int, int, int]
+    origin: np.ndarray  # (own blocks, 3): global index x, y, z of a block's first cell

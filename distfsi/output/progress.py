@@ -1,0 +1,80 @@
+"""What the user sees while a run goes on."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+
+from rich.progress import BarColumn, Progress as RichProgress, TextColumn, TimeElapsedColumn
+
+from distfsi.output.interfaces import Communicator
+
+SECONDS_BETWEEN_LINES = 5.0
+SECONDS_BETWEEN_REDRAWS = 0.2
+
+
+class Progress:
+    """Reports on rank 0 how far the run to `end_time` [s] is: a bar on a terminal, else a line every few seconds."""
+
+    def __init__(self, end_time: float, communicator: Communicator):
+        self._end_time = end_time
+        self._shown = communicator.rank == 0
+        self._bar = self._start_bar() if self._shown and sys.stdout.isatty() else None
+        self._interval = SECONDS_BETWEEN_REDRAWS if self._bar else SECONDS_BETWEEN_LINES
+        self._reported_step = 0
+        self._reported_at = clock.monotonic()
+
+    def update(self, step: int, time: float, dt: float, limited_by: str, extra: str = "") -> None:
+        """Report step number `step`, which reached `time` [s] with `dt` [s]; `limited_by` says what set `dt`."""
+        now = clock.monotonic()
+        if not self._shown or now - self._reported_at < self._interval:
+            return
+        rate = (step - self._reported_step) / (now - self._reported_at)
+        self._reported_step, self._reported_at = step, now
+        left = (self._end_time - time) / (dt * rate) if rate > 0.0 and dt > 0.0 else float("inf")
+        parts = [
+            f"step {step}",
+            f"t {format_time(time)} of {format_time(self._end_time)}",
+            f"dt {format_time(dt)} ({limited_by})",
+            f"{rate:.3g} steps/s",
+            f"ETA {format_duration(left)}",
+            extra,
+        ]
+        self._show("  ".join(part for part in parts if part), time)
+
+    def finish(self, message: str) -> None:
+        """Take the bar away and print `message`."""
+        if self._bar:
+            self._bar.stop()
+        if self._shown:
+            print(message, flush=True)
+
+    def _start_bar(self) -> RichProgress:
+        bar = RichProgress(BarColumn(bar_width=24), TextColumn("{task.description}"), TimeElapsedColumn())
+        bar.add_task("", total=self._end_time)
+        bar.start()
+        return bar
+
+    def _show(self, line: str, time: float) -> None:
+        if self._bar:
+            self._bar.update(self._bar.task_ids[0], completed=time, description=line)
+        else:
+            print(line, flush=True)
+
+
+def format_time(seconds: float) -> str:
+    """A physical time in the unit that suits its size: 1.25e-6 is "1.25 µs"."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)):
+        if seconds >= 0.9999 * size:
+            return f"{seconds / size:.4g} {unit}"
+    return "0 s" if seconds == 0.0 else f"{seconds / 1e-9:.4g} ns"
+
+
+def format_duration(seconds: float) -> str:
+    """A wall-clock time: 4000 is "1 h 06 min"."""
+    if seconds == float("inf"):
+        return "unknown"
+    minutes, hours = int(seconds // 60), int(seconds // 3600)
+    if hours:
+        return f"{hours} h {minutes % 60:02d} min"
+    return f"{minutes} min {int(seconds % 60):02d} s" if minutes else f"{seconds:.0f} s"

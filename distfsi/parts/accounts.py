@@ -1,0 +1,88 @@
+"""What is kept: masses, momentum and energy of fluid and solid, what left the domain, and what the coupling made or lost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+AXES = "xyz"
+
+
+class Accounts:
+    """Closes the books of a run: fluid + solid + left through boundaries - made by the coupling = constant.
+
+    `columns` are the names of the history's columns; `row(simulation)` gives their values.
+    """
+
+    def __init__(self, fluid, solid, coupling):
+        self.fluid, self.solid, self.coupling = fluid, solid, coupling
+        part = fluid or solid
+        self.dimensions = part.blocks.grid.dimensions
+        self.phases = fluid.model.phases if fluid else 0
+        momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
+        masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
+        self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
+        self._start: np.ndarray | None = None
+        self._scale = np.zeros(len(self.conserved))
+        self.columns = ["step", "time [s]", "time step [s]", "limited by"]
+        if fluid:
+            self.columns += [f"fluid {name}" for name in self.conserved]
+        self.columns += [f"left {name}" for name in self.conserved]
+        if solid:
+            self.columns += [
+                "solid mass [kg]",
+                *(f"solid {m}" for m in momentum),
+                "solid kinetic energy [J]",
+                "solid internal energy [J]",
+            ]
+        if coupling:
+            self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
+        self.columns += [f"drift {name}" for name in self.conserved]
+
+    def row(self, simulation) -> dict[str, float | int | str]:
+        """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
+        masses = self.phases
+        values: dict[str, float | int | str] = {
+            "step": simulation.steps,
+            "time [s]": simulation.time,
+            "time step [s]": simulation.dt,
+            "limited by": simulation.limited_by,
+        }
+        balance, size = np.zeros(len(self.conserved)), np.zeros(len(self.conserved))
+
+        def book(label: str, amounts: np.ndarray, sign: float = 1.0) -> None:
+            nonlocal balance, size
+            values.update({f"{label} {name}": amount for name, amount in zip(self.conserved, amounts, strict=True)})
+            balance, size = balance + sign * amounts, size + np.abs(amounts)
+
+        left = np.zeros(len(self.conserved))
+        if self.fluid:
+            book("fluid", self.fluid.totals(self.coupling.covered if self.coupling else None))
+            left = left + self.fluid.left_domain()
+        if self.solid:
+            totals = self.solid.totals()
+            amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])
+            balance, size = balance + amounts, size + np.abs(amounts)
+            values["solid mass [kg]"] = totals["mass"]
+            values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}
+            values["solid kinetic energy [J]"] = totals["kinetic"]
+            values["solid internal energy [J]"] = totals["internal"]
+            left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
+        book("left", left)
+        if self.coupling:
+            for cause, amounts in self.coupling.ledger().items():
+                book(f"ledger {cause}", amounts, -1.0)
+        if self._start is None:
+            self._start = balance
+        self._scale = np.maximum(self._scale, size)
+        drift = (balance - self._start) / np.where(self._scale > 0.0, self._scale, 1.0)
+        return values | {f"drift {name}": d for name, d in zip(self.conserved, drift, strict=True)}
+
+    def summary(self, simulation) -> str:
+        """One sentence on how well the books close; collective."""
+        row = self.row(simulation)
+        worst = max(abs(row[f"drift {name}"]) for name in self.conserved)
+        text = f"Books close to {worst:.1e}."
+        if self.coupling:
+            energy = sum(row[f"ledger {cause} energy [J]"] for cause in self.coupling.causes)
+            text += f" The coupling made {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
+        return text

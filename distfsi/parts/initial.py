@@ -1,0 +1,69 @@
+"""The fluid's state before the first step: regions painted over each other, cell by cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from distfsi.mesh.blocks import Blocks
+from distfsi.scene.description import Fluid, FluidState
+from distfsi.scene.shapes import cell_fractions
+
+
+class InitialState:
+    """Conserved states of the scene's regions, for one or two phases.
+
+    A region is one pure phase. With two phases the other one is present as a trace of volume fraction
+    `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives for it.
+    """
+
+    def __init__(self, fluid: Fluid, model):
+        self.fluid, self.model = fluid, model
+        self._conserved = model.formula("conserved")
+
+    def of(self, state: FluidState) -> np.ndarray:
+        """Conserved state (variables,) of a region or an inflow."""
+        densities = [state.density] if self.model.phases == 1 else self._densities(state)
+        fraction = [] if self.model.phases == 1 else [self._fraction(state)]
+        return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
+
+    def paint(self, blocks: Blocks, field: np.ndarray) -> None:
+        """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part holds that part of
+        the region's mass, momentum, energy and volume."""
+        dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
+        states = [self.of(region.state) for region in self.fluid.regions]
+        for block in range(blocks.local_count):
+            centers = blocks.cell_centers(block)[:dimensions]
+            cells = field[
+                (block, slice(None), *(slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1])))
+            ]
+            for region, state in zip(self.fluid.regions, states, strict=True):
+                new = state[:, None, None, None]
+                if region.shape is None:
+                    cells[:] = new
+                    continue
+                part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
+                cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, part * new + (1.0 - part) * cells))
+
+    def _fraction(self, state: FluidState) -> float:
+        trace = self.fluid.minimum_volume_fraction
+        return 1.0 - trace if state.phase == 0 else trace
+
+    def _densities(self, state: FluidState) -> list[float]:
+        other = 1 - state.phase
+        known = next((r.state for r in self.fluid.regions if r.state.phase == other), None)
+        trace = state.density if known is None else self._on_isentrope(other, known, state.pressure)
+        return [state.density, trace] if state.phase == 0 else [trace, state.density]
+
+    def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
+        """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""
+        eos = self.model.eos[phase]
+
+        def slope(p, rho):
+            reference, gradient = eos.evaluate(rho[0])
+            return [1.0 / (gradient + (p - reference + eos.omega * p) / rho[0])]
+
+        if pressure == known.pressure:
+            return known.density
+        path = solve_ivp(slope, (known.pressure, pressure), [known.density], method="LSODA", rtol=1e-9, atol=1e-12)
+        return float(path.y[0, -1])

@@ -1,0 +1,227 @@
+"""The solid: smoothed particles in an updated Lagrangian frame (paper, Sec. 2.1 and Appendix A)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from distfsi.device import cpu
+from distfsi.device.emit import plain
+from distfsi.errors import Diverged
+from distfsi.kernels import solid as kernels
+from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.particles import ParticleExchange
+from distfsi.parts.materials import eos_table, strength_table
+from distfsi.parts.neighbours import NeighbourSearch
+from distfsi.physics.strength import von_mises
+from distfsi.scene.description import Scene
+from distfsi.scene.packing import pack
+from distfsi.scene.shapes import contains
+
+DRIVERS = (
+    kernels.find_cells,
+    kernels.fill_cells,
+    kernels.order_cells,
+    kernels.find_neighbours,
+    kernels.accelerate,
+    kernels.heat,
+    kernels.deform,
+)
+ROOM_COLUMN = 7  # of the strength table
+LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
+
+
+class Solid:
+    """All particles of this rank. A step is prepare(), time_step(), advance(dt, impulse), migrate().
+
+    columns  this rank's particles, sorted by (block, id): id, body, fixed (n,), position [m], velocity [m/s] (n, D),
+             mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), deviator (n, D(D+1)/2) [Pa],
+             plastic_strain, temperature [K], pressure [Pa], sound_speed [m/s] (n,).
+             Velocities belong to half a step before the positions.
+    work     (local blocks,) work [J] of the last step's external impulse
+    """
+
+    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: cpu.Team):
+        self.blocks, self.communicator, self.team = blocks, communicator, team
+        self.dimensions = scene.domain.dimensions
+        self.gravity = np.array(scene.gravity)
+        self.eos, self.strength = eos_table(scene.solid.bodies), strength_table(scene.solid.bodies)
+        self.exchange = ParticleExchange(blocks)
+        axes = range(self.dimensions)
+        self._vector = tuple((a,) for a in axes)
+        self._tensor = (*((a, a) for a in axes), *((a, b) for a in axes for b in axes if a < b))
+        constants = {
+            "DIMENSIONS": self.dimensions,
+            "COMPONENTS": len(self._tensor),
+            "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
+            "VISCOSITY_BETA": scene.solid.viscosity_beta,
+        }
+        self.kernels = cpu.build(DRIVERS, constants)
+        self._von_mises = plain(von_mises, constants)
+        self.neighbours = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
+        self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
+        self._gravity_work = np.zeros(blocks.local_count)
+        self.work = np.zeros(blocks.local_count)
+        self._own_particles(scene)
+
+    def _own_particles(self, scene: Scene) -> None:
+        """Pack the bodies and keep the particles of this rank's blocks."""
+        columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
+        columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
+        count = len(columns["body"])
+        columns["id"] = np.arange(count)
+        block = self.blocks.block_of(columns["position"])
+        mine = np.flatnonzero(self.blocks.owners[block] == self.communicator.rank)
+        mine = mine[np.argsort(block[mine], kind="stable")]
+        c = {name: column[mine] for name, column in columns.items()}
+        n = len(mine)
+        c |= {name: np.zeros(n) for name in ("energy", "plastic_strain", "pressure", "sound_speed")}
+        c["deviator"] = np.zeros((n, len(self._tensor)))
+        c["temperature"] = self.strength[c["body"], ROOM_COLUMN]
+        self.columns = c
+        self._find_blocks()
+        self._deform(0.0, np.zeros((n, self.dimensions**2)))
+
+    def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
+        body = scene.solid.bodies[b]
+        position, volume = pack(body, scene.domain.lower, scene.domain.upper)
+        n = len(position)
+        fixed = np.zeros(n, dtype=bool) if body.fixed is None else contains(body.fixed, position)
+        return {
+            "body": np.full(n, b),
+            "position": position,
+            "velocity": np.where(fixed[:, None], 0.0, np.array(body.velocity)),
+            "fixed": fixed,
+            "mass": body.density * volume,
+            "density": np.full(n, body.density),
+            "h": np.full(n, scene.solid.smoothing * body.spacing),
+        }
+
+    # ---- the step ---------------------------------------------------------------------------------------------------
+
+    def prepare(self, reach: float = 0.0) -> None:
+        """Collective. Bring in ghosts and images, find neighbours, and compute the forces between particles.
+
+        `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. Raises Diverged on all
+        ranks when a smoothing length is not finite.
+        """
+        c = self.columns
+        support = 2.0 * self.communicator.maximum(np.array([c["h"].max(initial=0.0)]))[0]
+        if not np.isfinite(support):
+            raise Diverged("solid: a smoothing length is not finite")
+        state = [c[name] for name in ("mass", "density", "h", "pressure", "sound_speed", "velocity", "deviator")]
+        parity = ((),) * kernels.VELOCITY + self._vector + self._tensor
+        self._plan = self.exchange.ghosts(c["position"], c["id"], max(reach, support))
+        self._position, self._state = self._plan.exchange(
+            [(c["position"], "position"), (np.column_stack(state), parity)]
+        )
+        own = self._plan.own
+        self.neighbours.find(own, self._position, self._state, self._plan.key, support)
+        self._acceleration, self._limits = np.empty((own, self.dimensions)), np.empty((own, len(LIMITS)))
+        self._run(self.kernels.accelerate, *self._pairs, self._acceleration, self._limits)
+
+    def time_step(self) -> tuple[float, str]:
+        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare()."""
+        if self._limits.size == 0:
+            return np.inf, "solid"
+        particle, cause = divmod(int(np.argmin(self._limits)), len(LIMITS))
+        dt = float(self._limits[particle, cause])
+        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {self.columns['id'][particle]}"
+
+    def advance(self, dt: float, impulse: np.ndarray | None = None) -> None:
+        """Collective, after prepare(). Advance by `dt` [s], while the fluid gives `impulse` (own, D) [N s].
+
+        The energy takes the mean of old and new velocities: kinetic plus internal energy grow by the external work.
+        """
+        c = self.columns
+        mass, fixed = c["mass"][:, None], c["fixed"][:, None]
+        impulse = np.zeros_like(c["velocity"]) if impulse is None else impulse
+        weight = mass * self.gravity * dt
+        received = mass * self._acceleration * dt
+        velocity = np.where(fixed, 0.0, c["velocity"] + (received + weight + impulse) / mass)
+        mean = 0.5 * (c["velocity"] + velocity)
+        self.work = self._per_block((impulse * mean).sum(axis=1, keepdims=True))[:, 0]
+        self._gravity_work += self._per_block((weight * mean).sum(axis=1, keepdims=True))[:, 0]
+        self._boundary_impulse += self._per_block(received + weight - fixed * (received + weight + impulse))
+
+        (around,) = self._plan.exchange([(velocity, self._vector)])
+        gradient = np.empty((self._plan.own, self.dimensions**2))
+        self._run(self.kernels.heat, *self._pairs, dt, around, c["energy"], gradient)
+        self._deform(dt, gradient)
+        c["velocity"] = velocity
+        c["position"] = c["position"] + dt * velocity
+
+    def migrate(self) -> None:
+        """Collective. Give the particles that left this rank's blocks to their new owners."""
+        self.columns = self.exchange.migrate(self.columns)
+        self._find_blocks()
+
+    def _deform(self, dt: float, gradient: np.ndarray) -> None:
+        c = self.columns
+        names = ("energy", "density", "h", "deviator", "plastic_strain", "temperature", "pressure", "sound_speed")
+        arrays = [c[name] for name in names]
+        self._run(self.kernels.deform, dt, gradient, c["body"], self.eos, self.strength, *arrays)
+
+    def _run(self, kernel: Callable, *arguments) -> None:
+        self.team.run(kernel, len(self.columns["id"]), *arguments)
+
+    @property
+    def _pairs(self) -> tuple[np.ndarray, ...]:
+        """What a loop over pairs reads."""
+        return self._position, self._state, self.neighbours.table, self.neighbours.count
+
+    # ---- totals and output ------------------------------------------------------------------------------------------
+
+    def _find_blocks(self) -> None:
+        self._block = self.blocks.block_of(self.columns["position"]) - self.blocks.first
+
+    def _per_block(self, values: np.ndarray) -> np.ndarray:
+        """Sums (local blocks, k) of `values` (own, k), particle by particle in the order of their ids."""
+        count = self.blocks.local_count
+        return np.stack([np.bincount(self._block, v, minlength=count) for v in values.T], axis=1)
+
+    @property
+    def around(self) -> dict[str, np.ndarray]:
+        """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, h, key."""
+        s, v = self._state, kernels.VELOCITY
+        scalars = {"mass": kernels.MASS, "density": kernels.DENSITY, "h": kernels.SMOOTHING}
+        return {
+            "position": self._position,
+            "velocity": np.ascontiguousarray(s[:, v : v + self.dimensions]),
+            "key": self._plan.key,
+        } | {name: np.ascontiguousarray(s[:, column]) for name, column in scalars.items()}
+
+    def check(self, time: float) -> None:
+        """Raise Diverged, naming the particle, if one of this rank has no valid state at `time` [s]."""
+        c = self.columns
+        names = ("position", "velocity", "density", "energy", "sound_speed")
+        broken = np.flatnonzero(~np.isfinite(np.column_stack([c[name] for name in names])).all(axis=1))
+        if len(broken):
+            state = ", ".join(f"{name} {c[name][broken[0]]}" for name in names)
+            raise Diverged(f"solid particle {c['id'][broken[0]]} has no valid state at t = {time:.6g} s: {state}")
+
+    def totals(self) -> dict[str, np.ndarray]:
+        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks."""
+        c = self.columns
+        mass, velocity = c["mass"], c["velocity"]
+        kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
+        values = np.column_stack([mass, kinetic, mass * c["energy"], mass[:, None] * velocity])
+        total = self.blocks.sum(self._per_block(values))
+        return {"mass": total[0], "kinetic": total[1], "internal": total[2], "momentum": total[3:]}
+
+    def boundary_impulse(self) -> np.ndarray:
+        """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
+        return self.blocks.sum(self._boundary_impulse)
+
+    def gravity_work(self) -> float:
+        """Collective. Work [J] of gravity since the start."""
+        return self.blocks.sum(self._gravity_work[:, None])[0]
+
+    def outputs(self) -> dict[str, np.ndarray]:
+        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,)."""
+        c, D = self.columns, self.dimensions
+        vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
+        names = ("density", "pressure", "energy", "plastic_strain", "temperature", "id", "body")
+        return vectors | {name: c[name] for name in names} | {"von_mises": self._von_mises(c["deviator"].T)}

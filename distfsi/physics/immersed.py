@@ -1,0 +1,26 @@
+"""The immersed boundary: weights between cells and particles, and what a cell behind the wall holds (paper, Sec. 3.2)."""
+
+from distfsi.physics.smoothing import smoothing_kernel
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
+
+
+def immersed_weight(distance2, radius):
+    """Wendland C2 kernel [1/m^d] that vanishes at `radius`, at the squared distance `distance2` [m2] below radius^2."""
+    return smoothing_kernel(distance2, 0.5 * radius)
+
+
+def moving_with(W, velocity):
+    """Primitive state W with another velocity: the boundary's (Eq. 31) behind a wall."""
+    return (
+        *(W[v] for v in static_range(PHASES)),
+        *(velocity[d] for d in static_range(DIMENSIONS)),
+        *(W[v] for v in static_range(PHASES + DIMENSIONS, VARIABLES)),
+    )
+
+
+def impulse_on_wall(passed, velocity):
+    """Impulse [N s] on the solid in a cell moving with `velocity` [m/s] into which the amounts `passed` (masses, momentum
+    and energy) have crossed the wall (Eq. 33, corrected: only faces towards the fluid count)."""
+    mass = sum(passed[v] for v in static_range(PHASES))
+    return tuple(passed[PHASES + d] - velocity[d] * mass for d in static_range(DIMENSIONS))

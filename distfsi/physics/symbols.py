@@ -1,0 +1,50 @@
+"""Names that a scene fixes. Formulas import them from here; emission puts the scene's values and formulas in their place.
+
+Each symbol says what it stands for; a formula that is emitted while one of its symbols is still open is refused.
+"""
+
+
+class Symbol:
+    """A constant that the scene gives (a number, a truth value or a tuple of numbers)."""
+
+    def __init__(self, meaning: str):
+        self.meaning = meaning
+
+
+def chosen(name: str, meaning: str):
+    """A formula that the scene chooses."""
+
+    def formula(*arguments):
+        raise NotImplementedError(f"{name} ({meaning}) is chosen by the scene")
+
+    formula.__doc__ = meaning
+    return formula
+
+
+DIMENSIONS = Symbol("number of space dimensions, 1 to 3")
+
+# ---- fluid -----------------------------------------------------------------------------------------------------------
+
+PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 (six-equation model)")
+VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the volume fraction when there are two phases")
+FLUXES = Symbol("values per face: VARIABLES, and for two phases both phase energies and the face velocity")
+GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
+MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
+OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega rho e")
+OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
+CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
+
+reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
+primitives = chosen("primitives", "conserved state -> primitive state")
+conserved = chosen("conserved", "primitive state -> conserved state")
+face_flux = chosen("face_flux", "left and right primitive states, normal velocity first -> fluxes")
+updated = chosen("updated", "the state after a Runge-Kutta stage")
+sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
+
+# ---- solid -----------------------------------------------------------------------------------------------------------
+
+COMPONENTS = Symbol("stored components of a symmetric tensor: DIMENSIONS (DIMENSIONS + 1)/2")
+VISCOSITY_ALPHA = Symbol("Monaghan viscosity, linear part")
+VISCOSITY_BETA = Symbol("Monaghan viscosity, quadratic part")

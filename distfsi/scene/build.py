@@ -1,0 +1,97 @@
+"""From validated tables to the frozen description."""
+
+from __future__ import annotations
+
+from distfsi.scene.description import (
+    Body,
+    Domain,
+    Fluid,
+    FluidState,
+    Output,
+    Performance,
+    Phase,
+    Region,
+    Solid,
+    Time,
+)
+from distfsi.scene.schema import (
+    DomainInput,
+    FluidInput,
+    OutputInput,
+    PerformanceInput,
+    SolidInput,
+    StateInput,
+    TimeInput,
+)
+from distfsi.scene.thermodynamics import pressure
+
+BLOCK_CELLS = ((512,), (128, 64), (64, 32, 32))
+TILE_CELLS = ((512,), (128, 32), (64, 8, 8))
+AXES = ("x", "y", "z")
+SIDES = ("low", "high")
+
+
+def build_domain(given: DomainInput) -> Domain:
+    """The box of cells."""
+    boundaries = tuple(getattr(given, axis) for axis in AXES[: len(given.cells)])
+    return Domain(given.lower, given.upper, given.cells, boundaries)
+
+
+def build_time(given: TimeInput) -> Time:
+    """End and step size."""
+    return Time(given.end, given.cfl, given.maximum_steps)
+
+
+def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
+    """Phases, initial state and method of the flow."""
+    phases = tuple(Phase(name, eos.build()) for name, eos in given.phases.items())
+    regions = tuple(
+        Region(_state(region, phases, dimensions), region.shape.build() if region.shape else None)
+        for region in given.regions
+    )
+    inflow = tuple(
+        tuple(
+            _state(state, phases, dimensions) if (state := getattr(given.inflow, f"{axis}_{side}")) else None
+            for side in SIDES
+        )
+        for axis in AXES[:dimensions]
+    )
+    return Fluid(phases, regions, given.reconstruction, given.minimum_volume_fraction, inflow, given.precision)
+
+
+def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:
+    index = [phase.name for phase in phases].index(given.phase)
+    p = given.pressure
+    if p is None:
+        p = pressure(phases[index].eos, given.density, given.energy)
+    return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions)
+
+
+def build_solid(given: SolidInput, dimensions: int) -> Solid:
+    """Bodies and method of the solid."""
+    bodies = tuple(
+        Body(
+            name,
+            body.shape.build(),
+            body.spacing,
+            body.density,
+            body.velocity or (0.0,) * dimensions,
+            body.eos.build(),
+            body.strength.build(),
+            body.fixed.build() if body.fixed else None,
+        )
+        for name, body in given.bodies.items()
+    )
+    return Solid(bodies, given.smoothing, given.viscosity_alpha, given.viscosity_beta)
+
+
+def build_output(given: OutputInput, stem: str) -> Output:
+    """Where results go: out/`stem` unless the input names a directory."""
+    return Output(given.directory or f"out/{stem}", given.fields_every, given.history_every)
+
+
+def build_performance(given: PerformanceInput, dimensions: int) -> Performance:
+    """Block and tile sizes; a default tile is no larger than the block."""
+    block = given.block_cells or BLOCK_CELLS[dimensions - 1]
+    tile = given.tile_cells or tuple(map(min, TILE_CELLS[dimensions - 1], block))
+    return Performance(block, tile)

@@ -1,0 +1,161 @@
+"""What a schema cannot say: faults between the parts of a scene, all of them at once."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from distfsi.scene.build import AXES, SIDES
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, HalfSpace, Solid, Tube
+from distfsi.scene.faults import Fault, Path
+from distfsi.scene.packing import pack
+from distfsi.scene.schema import DomainInput, FluidInput, PerformanceInput, Sections
+from distfsi.scene.shapes import bounding_box, contains
+from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
+
+COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
+CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
+
+
+def check(sections: Sections, domain: Domain | None, fluid: Fluid | None, solid: Solid | None) -> Iterator[Fault]:
+    """Faults between parts that are valid in themselves; None stands for a part that is absent or invalid."""
+    if fluid is not None:
+        yield from check_fluid(sections.fluid, fluid)
+    if domain is None:
+        return
+    yield from check_performance(sections.performance, domain.dimensions)
+    faults = list(check_domain(sections.domain, domain))
+    yield from faults
+    if faults:
+        return  # nothing can be placed in a domain that is wrong itself
+    if fluid is not None:
+        yield from check_inflow(sections.fluid, domain)
+    if solid is not None:
+        yield from check_solid(solid, domain)
+        if fluid is not None:
+            yield from check_coupling(solid, domain)
+
+
+def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
+    """Corners, absent axes, periodic pairs."""
+    for axis in range(len(AXES)):
+        path = ("domain", AXES[axis])
+        if axis >= domain.dimensions:
+            if AXES[axis] in given.model_fields_set:
+                yield Fault(path, f"the domain has {domain.dimensions} dimension(s), so no {AXES[axis]} ends")
+            continue
+        if domain.lower[axis] >= domain.upper[axis]:
+            yield Fault(("domain", "upper"), f"must be greater than lower along {AXES[axis]}")
+        if domain.boundaries[axis].count("periodic") == 1:
+            yield Fault(path, "one end is periodic; expected both or none")
+
+
+def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
+    """Regions and the states in them."""
+    if not fluid.regions:
+        yield Fault(("fluid", "regions"), "is empty; expected an initial state")
+    for n, (source, region) in enumerate(zip(given.regions, fluid.regions, strict=True)):
+        path = ("fluid", "regions", n)
+        if n == 0 and region.shape is not None:
+            yield Fault((*path, "shape"), "the first region covers the whole domain; expected no shape")
+        if n > 0 and region.shape is None:
+            yield Fault(path, "covers everything before it; only the first region has no shape")
+        yield from _check_state(path, source.energy is not None, region.state, fluid)
+    for axis, sides in enumerate(fluid.inflow):
+        for side, state in enumerate(sides):
+            if state is not None:
+                name = f"{AXES[axis]}_{SIDES[side]}"
+                by_energy = getattr(given.inflow, name).energy is not None
+                yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+
+
+def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
+    """A state needs a real sound speed."""
+    phase = fluid.phases[state.phase]
+    cold_pressure, cold_energy, _ = cold_curve(phase.eos, state.density)
+    if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
+        return
+    key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
+    yield Fault((*path, key), f"too low: at this density '{phase.name}' has a sound speed only above {bound}")
+
+
+def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
+    """Each inflow end has its state and each state its end."""
+    for axis, side in itertools.product(range(len(AXES)), range(2)):
+        name = f"{AXES[axis]}_{SIDES[side]}"
+        path = ("fluid", "inflow", name)
+        kind = domain.boundaries[axis][side] if axis < domain.dimensions else None
+        state = getattr(given.inflow, name)
+        if kind == "inflow" and state is None:
+            yield Fault(path, f"is missing: the {SIDES[side]} {AXES[axis]} end of the domain is 'inflow'")
+        if kind != "inflow" and state is not None:
+            what = f"is '{kind}'; expected 'inflow'" if kind else "does not exist"
+            yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
+
+
+def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
+    """Bodies lie in the domain, can be packed and do not overlap."""
+    for axis, ends in enumerate(domain.boundaries):
+        if "periodic" in ends:
+            yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
+    packed: list[tuple[Body, np.ndarray]] = []
+    for body in solid.bodies:
+        path = ("solid", "bodies", body.name)
+        if isinstance(body.shape, Tube) and domain.dimensions != 2:
+            yield Fault((*path, "shape"), "a tube is packed in 2D only; not available yet in other dimensions")
+            continue
+        yield from _check_extent((*path, "shape"), body, domain)
+        positions, _ = pack(body, domain.lower, domain.upper)
+        if len(positions) == 0:
+            yield Fault((*path, "shape"), "no particle of it lies inside the domain")
+        else:
+            packed.append((body, positions))
+    for first, second in itertools.combinations(packed, 2):
+        if _overlap(first, second):
+            yield Fault(("solid", "bodies", second[0].name, "shape"), f"overlaps body '{first[0].name}'")
+
+
+def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
+    """Only a symmetry plane may cut a body; a half space means to be cut."""
+    if isinstance(body.shape, HalfSpace):
+        return
+    lower, upper = bounding_box(body.shape)
+    for axis, ends in enumerate(domain.boundaries):
+        slack = 1e-6 * body.spacing
+        beyond = (lower[axis] < domain.lower[axis] - slack, upper[axis] > domain.upper[axis] + slack)
+        for side in range(2):
+            if beyond[side] and ends[side] != "symmetry":
+                where = f"the {SIDES[side]} {AXES[axis]} end of the domain"
+                yield Fault(path, f"reaches beyond {where}, which is '{ends[side]}'; only 'symmetry' may cut a body")
+
+
+def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) -> bool:
+    (a, points_of_a), (b, points_of_b) = first, second
+    if contains(a.shape, points_of_b).any() or contains(b.shape, points_of_a).any():
+        return True
+    gap, _ = cKDTree(points_of_a).query(points_of_b)
+    return gap.min() < CLOSEST_BODIES * 0.5 * (a.spacing + b.spacing)
+
+
+def check_coupling(solid: Solid, domain: Domain) -> Iterator[Fault]:
+    """Bodies in a fluid are tight."""
+    coarsest = COARSEST_SPACING * min(domain.spacing)
+    for body in solid.bodies:
+        if body.spacing > coarsest:
+            path = ("solid", "bodies", body.name, "spacing")
+            text = f"{body.spacing:.6g} m is too coarse for the fluid cells; expected at most {coarsest:.6g} m"
+            yield Fault(path, f"{text}, {COARSEST_SPACING} of the smallest cell; half a cell is better")
+
+
+def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:
+    """One block and tile size per dimension, tiles within blocks."""
+    for key in ("block_cells", "tile_cells"):
+        sizes = getattr(given, key)
+        if sizes is not None and len(sizes) != dimensions:
+            yield Fault(("performance", key), f"has {len(sizes)} entries, needs {dimensions}")
+    block, tile = given.block_cells or (), given.tile_cells or ()
+    if any(t > b for t, b in zip(tile, block, strict=False)):
+        yield Fault(("performance", "tile_cells"), "a tile is larger than a block")

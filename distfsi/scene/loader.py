@@ -1,0 +1,89 @@
+"""Reading an input: TOML, overrides, validation, cross checks. All faults are told at once."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path as File
+from typing import Any
+
+from pydantic import ValidationError
+
+from distfsi.errors import InputError
+from distfsi.scene import build, checks
+from distfsi.scene.description import Scene
+from distfsi.scene.diagnosis import diagnose
+from distfsi.scene.faults import Fault, Locations
+from distfsi.scene.overrides import apply
+from distfsi.scene.schema import Input, Sections, context_of
+
+
+def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
+    """The scene that the TOML file at `path` describes, with `overrides` ("key.path=value") laid over it.
+
+    Raises InputError with one line per fault: file, key, line, what was given, what was expected.
+    """
+    file = File(path)
+    text, data = _read(file)
+    overridden, faults = apply(data, overrides)
+    sections, invalid = validate(data)
+    scene, crossed = _assemble(sections, data, file.stem)
+    faults += invalid + crossed
+    if faults:
+        locations = Locations(file.name, text, overridden)
+        raise InputError(locations.tell(faults))
+    return scene
+
+
+@cache
+def schema() -> dict[str, Any]:
+    """JSON schema of the input, for editors."""
+    return Input.model_json_schema()
+
+
+def _read(file: File) -> tuple[str, dict[str, Any]]:
+    try:
+        text = file.read_text(encoding="utf-8")
+        return text, tomllib.loads(text)
+    except OSError as error:
+        raise InputError([f"{file}: cannot be read: {error.strerror}"]) from error
+    except UnicodeDecodeError as error:
+        raise InputError([f"{file}: is no UTF-8 text"]) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError([f"{file}: is no TOML: {error}"]) from error
+
+
+def validate(data: dict[str, Any]) -> tuple[Sections, list[Fault]]:
+    """The sections of `data` that are valid in themselves, and the faults of the others."""
+    context = context_of(data)
+    try:
+        return Input.model_validate(data, context=context), []
+    except ValidationError as error:
+        errors = error.errors()
+    sound = {key: value for key, value in data.items() if key not in {error["loc"][0] for error in errors}}
+    return Sections.model_validate(sound, context=context), diagnose(errors, data, schema())
+
+
+def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scene | None, list[Fault]]:
+    """The scene, or the faults between its parts; parts that are invalid in themselves are left out of the checks."""
+    domain = build.build_domain(sections.domain) if sections.domain else None
+    dimensions = domain.dimensions if domain else 1
+    fluid = build.build_fluid(sections.fluid, dimensions) if sections.fluid else None
+    solid = build.build_solid(sections.solid, dimensions) if sections.solid else None
+    faults = list(checks.check(sections, domain, fluid, solid))
+    if not {"fluid", "solid"} & data.keys():
+        faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))
+    if faults or not isinstance(sections, Input):
+        return None, faults
+    scene = Scene(
+        title=sections.title or stem,
+        domain=domain,
+        time=build.build_time(sections.time),
+        gravity=sections.domain.gravity or (0.0,) * dimensions,
+        fluid=fluid,
+        solid=solid,
+        output=build.build_output(sections.output, stem),
+        performance=build.build_performance(sections.performance, dimensions),
+    )
+    return scene, faults

@@ -1,0 +1,107 @@
+"""The reference of the input, written from the schema: `python -m distfsi.scene.reference > docs/input.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from distfsi.scene.loader import schema
+
+Json = Mapping[str, Any]
+
+INTRODUCTION = """# The input file
+
+<!-- Written from the schema: python -m distfsi.scene.reference > docs/input.md -->
+
+An input is a TOML file with `[domain]`, `[time]`, and `[fluid]`, `[solid]` or both. `inputs/` holds examples.
+
+* A number is in SI units; a text carries its own: `"0.5 mm"`, `"7.81 GPa"`, `"1.225 kg/m3"`, `"477 J/(kg K)"`.
+  Prefixes n u m c k M G go with m g s Hz N Pa bar J cal W; known besides: K t lb in ft l min h atm psi rad deg %.
+  Temperatures are in K.
+* A vector is a list with one entry per dimension of the domain; in one dimension a plain number will do.
+* Any value can be set on the command line: `--set time.cfl=0.4 --set solid.bodies.tube.strength=none
+  --set fluid.regions.1.density="1600 kg/m3"`; numbers in a path count the elements of a list from 0.
+* All faults are told at once, each with its key, its line, what was expected and the nearest right word.
+
+Keys without a default are needed.
+"""
+
+SECTIONS = {
+    "Top level": ("Input",),
+    "`[domain]`": ("DomainInput",),
+    "`[time]`": ("TimeInput",),
+    "`[fluid]`": ("FluidInput",),
+    "`[fluid.phases.NAME]`": ("IdealGas", "StiffenedGas", "Jwl"),
+    "`[[fluid.regions]]`": ("RegionInput",),
+    "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
+    "`[solid]`": ("SolidInput",),
+    "`[solid.bodies.NAME]`": ("BodyInput",),
+    "`eos` of a body": ("MieGrueneisen", "LinearEos"),
+    "`strength` of a body": ("NoStrength", "Elastic", "PerfectlyPlastic", "JohnsonCook"),
+    "Shapes": ("Box", "Ball", "HalfSpace", "Tube"),
+    "`[output]`": ("OutputInput",),
+    "`[performance]`": ("PerformanceInput",),
+}
+TABLE_HEAD = ["| key | value | default | meaning |", "|---|---|---|---|"]
+LIMITS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
+
+
+def markdown() -> str:
+    """The whole reference as Markdown."""
+    whole = schema()
+    definitions = whole["$defs"] | {"Input": whole}
+    lines = [INTRODUCTION]
+    for heading, names in SECTIONS.items():
+        lines += [f"## {heading}", ""]
+        for name in names:
+            lines += [definitions[name]["description"], "", *_table(definitions[name]), ""]
+    return "\n".join(lines)
+
+
+def _table(definition: Json) -> Iterator[str]:
+    required = definition.get("required", ())
+    rows = [_row(key, node, key in required) for key, node in definition["properties"].items()]
+    rows = [row for row in rows if row]
+    yield from TABLE_HEAD + rows if rows else ()
+
+
+def _row(key: str, node: Json, required: bool) -> str:
+    """One key; sections, which have headings of their own, give no row."""
+    if "description" not in node and "const" not in node:
+        return ""
+    default = node.get("default")
+    shown = "needed" if required else "" if default is None or isinstance(default, dict) else f"`{_toml(default)}`"
+    return f"| `{key}` | {_values(node)} | {shown} | {node.get('description', 'chooses this one')} |"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _values(node: Json) -> str:
+    """What may stand behind the key."""
+    if "const" in node:
+        return f'`"{node["const"]}"`'
+    if "enum" in node:
+        return ", ".join(f'`"{word}"`' for word in node["enum"])
+    if "prefixItems" in node:
+        return "two of " + _values(node["prefixItems"][0])
+    options = [node, *node.get("anyOf", ())]
+    for option in options:
+        if "discriminator" in option:
+            choice = option["discriminator"]
+            return f"table with `{choice['propertyName']}` " + ", ".join(f'`"{word}"`' for word in choice["mapping"])
+        if "unit" in option:
+            limits = [f"{sign} {option[key]:g}" for key, sign in LIMITS.items() if key in option]
+            kind = "number" if option["unit"] == "1" else option["unit"]
+            return ", ".join(["vector"] * ("array" in option["type"]) + [kind, *limits])
+        if "integer" in option.get("type", ()):
+            return "whole number" + ("s, one per axis" if "array" in option["type"] else "")
+    types = {option.get("type") for option in options}
+    return "text" if "string" in types else "list of tables" if "array" in types else "table"
+
+
+if __name__ == "__main__":
+    print(markdown())

@@ -1,0 +1,173 @@
+"""The sections of a TOML input as pydantic models: every key with its unit, range, default and meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from distfsi.scene import description
+from distfsi.scene.mirrors import PhaseInput, Shape, SolidEos, Strength
+from distfsi.scene.values import (
+    Acceleration,
+    Count,
+    Density,
+    Length,
+    PhaseName,
+    Position,
+    Pressure,
+    Table,
+    Velocity,
+    counts,
+    quantity,
+)
+
+# ---- domain and time -------------------------------------------------------------------------------------------------
+
+Ends = Annotated[
+    tuple[description.BoundaryKind, description.BoundaryKind],
+    Field(description="kind of the low and of the high end"),
+]
+OUTFLOW = ("outflow", "outflow")
+
+
+class DomainInput(Table):
+    """The box in which everything happens; the number of entries in `cells` is the number of dimensions."""
+
+    lower: Position = Field(description="low corner")
+    upper: Position = Field(description="high corner")
+    cells: counts(1) = Field(description="number of cells along each axis")
+    x: Ends = OUTFLOW
+    y: Ends = OUTFLOW
+    z: Ends = OUTFLOW
+    gravity: Acceleration | None = Field(None, description="acceleration of everything; default none")
+
+
+class TimeInput(Table):
+    """How long to run."""
+
+    end: quantity("s", gt=0.0) = Field(description="end time")
+    cfl: quantity("1", gt=0.0, le=1.0) = Field(0.5, description="dt as a fraction of the largest stable one")
+    maximum_steps: Count | None = Field(None, description="stop after so many steps")
+
+
+# ---- fluid -----------------------------------------------------------------------------------------------------------
+
+
+class StateInput(Table):
+    """State of one pure phase; give its pressure or its energy."""
+
+    phase: PhaseName = Field(description="name of the phase")
+    density: Density = Field(description="density")
+    pressure: Pressure | None = Field(None, description="pressure")
+    energy: quantity("J/kg") | None = Field(None, description="specific internal energy, instead of the pressure")
+    velocity: Velocity | None = Field(None, description="velocity; default at rest")
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> StateInput:
+        if (self.pressure is None) == (self.energy is None):
+            raise ValueError("give either pressure or energy" + (", not both" if self.pressure is not None else ""))
+        return self
+
+
+class RegionInput(StateInput):
+    """Initial state; later regions paint over earlier ones, and the first covers the whole domain."""
+
+    shape: Shape | None = Field(None, description="where; the first region has none and covers everything")
+
+
+class InflowInput(Table):
+    """State that comes in through each end whose kind is `inflow`."""
+
+    x_low: StateInput | None = None
+    x_high: StateInput | None = None
+    y_low: StateInput | None = None
+    y_high: StateInput | None = None
+    z_low: StateInput | None = None
+    z_high: StateInput | None = None
+
+
+class FluidInput(Table):
+    """The compressible flow of one or two phases, numbered in order of appearance."""
+
+    phases: dict[str, PhaseInput] = Field(
+        min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
+    )
+    regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
+    reconstruction: Literal["first_order", "minmod", "van_leer"] = Field("minmod", description="slopes of MUSCL")
+    minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
+        1e-6, description="share of the absent phase in a pure region"
+    )
+    precision: Literal["float64", "float32"] = Field("float64", description="arithmetic")
+
+
+# ---- solid -----------------------------------------------------------------------------------------------------------
+
+
+class BodyInput(Table):
+    """A solid body packed with particles."""
+
+    shape: Shape = Field(description="box, ball, half_space (cut to the domain) or tube")
+    spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
+    density: Density = Field(description="density at rest")
+    velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
+    eos: SolidEos = Field(description="pressure law")
+    strength: Strength = Field(description='strength model, or "none"')
+    fixed: Shape | None = Field(None, description="particles in here do not move")
+
+
+class SolidInput(Table):
+    """Solid bodies, computed with smoothed particles."""
+
+    bodies: dict[str, BodyInput] = Field(min_length=1, description="`[solid.bodies.NAME]`: the bodies")
+    smoothing: quantity("1", ge=1.0, le=3.0) = Field(1.3, description="smoothing length over particle spacing")
+    viscosity_alpha: quantity("1", ge=0.0) = Field(1.0, description="linear artificial viscosity")
+    viscosity_beta: quantity("1", ge=0.0) = Field(2.0, description="quadratic artificial viscosity")
+
+
+# ---- the whole -------------------------------------------------------------------------------------------------------
+
+
+class OutputInput(Table):
+    """What is written, where and when."""
+
+    directory: str | None = Field(None, description="default: out/ and the input file's name")
+    fields_every: quantity("s", ge=0.0) = Field(0.0, description="time between field outputs; 0: first and last only")
+    history_every: Count = Field(10, description="steps between lines of the history")
+
+
+class PerformanceInput(Table):
+    """Sizes that change speed, never the result."""
+
+    block_cells: counts(4) | None = Field(None, description="cells of a block: [512], [128, 64], [64, 32, 32]")
+    tile_cells: counts(1) | None = Field(None, description="cells of a tile: [512], [128, 32], [64, 8, 8]")
+
+
+class Sections(Table):
+    """The sections of an input, any of which may be absent."""
+
+    title: str = Field("", description="what this run is")
+    domain: DomainInput | None = None
+    time: TimeInput | None = None
+    fluid: FluidInput | None = None
+    solid: SolidInput | None = None
+    output: OutputInput = OutputInput()
+    performance: PerformanceInput = PerformanceInput()
+
+
+class Input(Sections):
+    """A whole input: [domain], [time], and at least one of [fluid] and [solid]."""
+
+    domain: DomainInput
+    time: TimeInput
+
+
+def context_of(data: Mapping[str, Any]) -> dict[str, Any]:
+    """What validation must know of the whole input `data`: its dimensions (None: not clear) and its phase names."""
+    domain, fluid = data.get("domain"), data.get("fluid")
+    cells = domain.get("cells") if isinstance(domain, dict) else None
+    phases = fluid.get("phases") if isinstance(fluid, dict) else None
+    dimensions = len(cells) if isinstance(cells, list) else 1 if isinstance(cells, int) else None
+    return {"dimensions": dimensions, "phases": tuple(phases) if isinstance(phases, dict) else ()}

@@ -1,0 +1,84 @@
+"""Kinds of values in an input: quantities with units, vectors, counts, names; and the tables that hold them.
+
+Validation gets a context {"dimensions": int | None, "phases": names}, taken from the raw input, so that vectors and
+names are checked where they stand.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from distfsi.scene.units import to_si
+
+
+class Table(BaseModel):
+    """A TOML table; unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Mirror(Table):
+    """A table that mirrors one class of description.py field by field, besides the word that chooses it."""
+
+    describes: ClassVar[type]
+    word: ClassVar[str] = "kind"
+
+    def build(self) -> Any:
+        """The instance of the described class."""
+        return self.describes(**{name: getattr(self, name) for name in type(self).model_fields if name != self.word})
+
+
+def quantity(unit: str, **limits: float) -> Any:
+    """Type of a number in `unit` within pydantic's `limits` (gt, ge, lt, le), given in SI or as a text with a unit."""
+    words = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+    told = {"type": ["number", "string"], "unit": unit} | {words[key]: limit for key, limit in limits.items()}
+    return Annotated[float, Field(**limits), BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(told)]
+
+
+def vector(unit: str) -> Any:
+    """Type of a list of numbers in `unit`, one per dimension of the domain; in 1D also a single number."""
+
+    def convert(value: Any, info: ValidationInfo) -> tuple[float, ...]:
+        entries = value if isinstance(value, list) else [value]
+        wanted = (info.context or {}).get("dimensions")
+        if wanted is not None and len(entries) != wanted:
+            raise ValueError(f"has {len(entries)} entries, needs {wanted}, one per dimension of the domain")
+        return tuple(to_si(entry, unit) for entry in entries)
+
+    told = {"type": ["array", "number", "string"], "items": {"type": ["number", "string"]}, "unit": unit}
+    return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(told)]
+
+
+def counts(minimum: int) -> Any:
+    """Type of a list of one to three whole numbers from `minimum` on; in 1D also a single number."""
+    number = Annotated[int, Field(strict=True, ge=minimum)]
+    as_list = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
+    told = {"type": ["array", "integer"], "items": {"type": "integer", "minimum": minimum}}
+    return Annotated[tuple[number, ...], Field(min_length=1, max_length=3), as_list, WithJsonSchema(told)]
+
+
+def _phase_name(value: Any, info: ValidationInfo) -> Any:
+    names = (info.context or {}).get("phases", ())
+    if isinstance(value, str) and names and value not in names:
+        raise PydanticCustomError("literal_error", "no such phase", {"expected": ", ".join(map(repr, names))})
+    return value
+
+
+Number = quantity("1")
+Fraction = quantity("1", ge=0.0, le=1.0)
+PositiveNumber = quantity("1", gt=0.0)
+Length = quantity("m", gt=0.0)
+Density = quantity("kg/m3", gt=0.0)
+Pressure = quantity("Pa")
+PositivePressure = quantity("Pa", gt=0.0)
+Temperature = quantity("K", ge=0.0)
+Speed = quantity("m/s", gt=0.0)
+Position = vector("m")
+Velocity = vector("m/s")
+Acceleration = vector("m/s2")
+Direction = vector("1")
+PhaseName = Annotated[str, BeforeValidator(_phase_name)]
+Count = Annotated[int, Field(strict=True, ge=1)]

@@ -1,0 +1,136 @@
+"""Published and independently computed results to compare with, in SI units."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from distfsi.scene.description import FluidEos, IdealGas, Jwl, MieGrueneisen, StiffenedGas
+from distfsi.study.exact import PureState
+
+AIR = IdealGas(gamma=1.4)
+WATER = StiffenedGas(gamma=4.4, p_inf=6.0e8)
+TNT = Jwl(rho0=1630.0, A=3.712e11, B=3.21e9, R1=4.15, R2=0.95, omega=0.3)
+"""Products of TNT (paper, Table 7)."""
+
+TNT_ENERGY = 4.29e6
+"""Detonation energy of TNT [J/kg] (paper, Table 7)."""
+
+TNT_PRESSURE = 8.375948642e9
+"""Pressure of TNT products at the density of the charge, the energy all released, at rest [Pa]; from the two above."""
+
+
+class TubeInstant(NamedTuple):
+    """The expanding steel tube at one time [s]: radii [m], velocity [m/s], energy [J/m of full ring], pressure [Pa]."""
+
+    time: float
+    inner_radius: float
+    expansion: float
+    thickness: float
+    mean_velocity: float
+    kinetic_energy: float
+    gas_pressure: float
+
+
+STEEL_TUBE = (
+    TubeInstant(2e-6, 30.52e-3, 1.017, 3.90e-3, 427.0, 0.594e6, 5072e6),
+    TubeInstant(5e-6, 32.56e-3, 1.085, 3.72e-3, 844.0, 2.25e6, 2964e6),
+    TubeInstant(10e-6, 38.09e-3, 1.270, 3.20e-3, 1216.0, 4.66e6, 1315e6),
+    TubeInstant(15e-6, 44.97e-3, 1.499, 2.76e-3, 1425.0, 6.40e6, 692e6),
+    TubeInstant(20e-6, 52.65e-3, 1.755, 2.38e-3, 1560.0, 7.66e6, 414e6),
+    TubeInstant(40e-6, 87.02e-3, 2.901, 1.46e-3, 1782.0, 10.0e6, 70.5e6),
+    TubeInstant(60e-6, 123.7e-3, 4.124, 1.03e-3, 1858.0, 10.9e6, 24.8e6),
+)
+"""The tube of the paper's Sec. 5.5 (charge radius 30 mm, wall 4 mm) without strength and without fracture, all energy
+of the charge released at once: an independent 1-D Lagrangian computation (Godunov, exact interfaces, 240 + 80 cells,
+air outside; a vacuum outside changes it by less than 0.8 %). `expansion` is inner radius over 30 mm; `gas_pressure` is
+at the wall. A yield stress of 1 GPa takes 6 to 7 % of the kinetic energy up to an expansion of 1.75."""
+
+GURNEY_VELOCITY = (1695.0, 1786.0)
+"""Range of Gurney's final velocity of the same tube for sqrt(2E) = 2316 to 2440 m/s [m/s]."""
+
+
+class ShockTube(NamedTuple):
+    """Two fluids at rest and what the exact solution gives between the waves; `shock` is the right wave's speed."""
+
+    left: PureState
+    right: PureState
+    eos_left: FluidEos
+    eos_right: FluidEos
+    p_star: float
+    u_star: float
+    shock: float
+
+
+WATER_AIR = ShockTube(
+    PureState(1000.0, 1e9), PureState(50.0, 1e5), WATER, AIR, p_star=1.419047721e7, u_star=482.6104121, shock=583.9276
+)
+"""The water/air tube of Saurel and Abgrall, SIAM J. Sci. Comput. 21 (1999) 1115; values by an independent solver."""
+
+WATER_AIR_INTERFACE, WATER_AIR_TIME = 0.7, 241e-6
+"""Where its membrane is on the unit interval [m] and when WATER_AIR_ERRORS were taken [s]."""
+
+WATER_AIR_STIFF = ShockTube(
+    PureState(1000.0, 1e9),
+    PureState(1.2, 1e5),
+    StiffenedGas(gamma=6.12, p_inf=3.43e8),
+    AIR,
+    p_star=533085.07,
+    u_star=486.7530,
+    shock=741.4525,
+)
+"""Water with another fit against air at its usual density; values by an independent solver."""
+
+AIR_WATER = ShockTube(
+    PureState(10.0, 1e9), PureState(1000.0, 1e5), AIR, WATER, p_star=951700876.4, u_star=416.9134, shock=2282.490
+)
+"""Compressed air against water; values by an independent solver."""
+
+
+class TubeErrors(NamedTuple):
+    """Relative L1 errors of another code's density, velocity and pressure on WATER_AIR."""
+
+    code: str
+    scheme: str
+    cells: int
+    density: float
+    velocity: float
+    pressure: float
+
+
+WATER_AIR_ERRORS = (
+    TubeErrors("ECOGEN 4.0", "MUSCL minmod", 200, 9.65e-3, 1.81e-2, 2.23e-2),
+    TubeErrors("ECOGEN 4.0", "MUSCL minmod", 1000, 3.07e-3, 3.05e-3, 4.35e-3),
+    TubeErrors("ECOGEN 4.0", "MUSCL van Leer", 1000, 2.24e-3, 2.42e-3, 3.44e-3),
+    TubeErrors("MFC", "MUSCL van Leer", 500, 2.6e-3, 3.5e-3, 1.3e-3),
+    TubeErrors("MFC", "MUSCL van Leer", 1000, 1.57e-3, 1.8e-3, 0.65e-3),
+    TubeErrors("MFC", "WENO5-JS", 500, 16e-3, 63e-3, 6.6e-3),
+    TubeErrors("MFC", "WENO5-JS", 1000, 11.6e-3, 30e-3, 3.5e-3),
+)
+"""Measured by running those codes and comparing with the exact solution; MFC's are over the range of each variable."""
+
+
+class FlyerPlate(NamedTuple):
+    """Two plates of one material meet at `velocity` [m/s]; behind the shocks: pressure [Pa], shock velocity [m/s]
+    against the plate ahead, compression rho/rho0."""
+
+    density: float
+    eos: MieGrueneisen
+    velocity: float
+    pressure: float
+    shock_velocity: float
+    compression: float
+
+
+COPPER, COPPER_DENSITY = MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.0), 8930.0
+ALUMINIUM, ALUMINIUM_DENSITY = MieGrueneisen(c0=5350.0, s1=1.34, s2=0.0, s3=0.0, gamma0=2.0, a=0.0), 2703.0
+STEEL, STEEL_DENSITY = MieGrueneisen(c0=4569.0, s1=1.49, s2=0.0, s3=0.0, gamma0=2.17, a=0.46), 7830.0
+"""Shock equations of state of copper, aluminium 6061 and the steel of the paper's Table 5, with densities [kg/m3]."""
+
+FLYER_PLATES = (
+    FlyerPlate(COPPER_DENSITY, COPPER, 500.0, 9.627e9, 4312.25, 1.0615),
+    FlyerPlate(COPPER_DENSITY, COPPER, 1000.0, 20.916e9, 4684.5, 1.1195),
+    FlyerPlate(ALUMINIUM_DENSITY, ALUMINIUM, 800.0, 6.364e9, 5886.0, 1.0729),
+    FlyerPlate(STEEL_DENSITY, STEEL, 500.0, 9.673e9, 4941.5, 1.0533),
+    FlyerPlate(STEEL_DENSITY, STEEL, 1000.0, 20.80e9, 5314.0, 1.1039),
+)
+"""Symmetric impact without strength by the jump conditions: u = velocity/2, U = c0 + s1 u, p = rho U u, e = u^2/2."""

@@ -1,0 +1,106 @@
+"""Solids for the tests, and the run that every rank makes; started by test_solid.py.
+
+mpi_solid.py    runs the cases with 1 and 2 threads; rank 0 prints what must not depend on the number of ranks
+"""
+
+import hashlib
+import math
+
+import numpy as np
+
+from distfsi.device.cpu import Team
+from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.mesh.communicator import Communicator, install_abort_on_exception
+from distfsi.parts.solid import Solid
+from distfsi.scene import description as d
+
+COPPER_EOS = d.MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
+COPPER = d.JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
+SOFT_EOS = d.LinearEos(bulk_modulus=3.25e9)
+SOFT = d.PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
+
+
+def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None):
+    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), eos, strength, fixed)
+
+
+def solid(bodies, lower, upper, symmetric=(), threads=1, block_cells=4, gravity=None, viscosity=(1.0, 2.0)):
+    """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
+    D = len(lower)
+    kinds = tuple(("symmetry" if axis in symmetric else "outflow", "outflow") for axis in range(D))
+    scene = d.Scene(
+        title="test",
+        domain=d.Domain(lower, upper, (16,) * D, kinds),
+        time=d.Time(1.0, 0.5, None),
+        gravity=gravity or (0.0,) * D,
+        fluid=None,
+        solid=d.Solid(tuple(bodies), 1.3, *viscosity),
+        output=d.Output("", 0.0, 1),
+        performance=d.Performance((block_cells,) * D, (block_cells,) * D),
+    )
+    communicator = Communicator()
+    blocks = Blocks(Grid.of(lower, upper, (16,) * D, kinds), scene.performance.block_cells, communicator)
+    return Solid(scene, blocks, communicator, Team(threads))
+
+
+def step(part, impulse=None):
+    """One step of the largest stable size; `impulse(columns)` -> impulses [N s]. Returns the step and the work done."""
+    part.prepare()
+    dt = -part.communicator.maximum(np.array([-part.time_step()[0]]))[0]
+    part.advance(dt, None if impulse is None else impulse(part.columns))
+    work = part.blocks.sum(part.work[:, None])[0]
+    part.migrate()
+    return dt, work
+
+
+def digest(part):
+    """Hash of all particles of all ranks in the order of their ids, and of the totals."""
+    c = part.columns
+    names = sorted(c)
+    rows = np.column_stack([c[name].astype(float) for name in names])
+    rows = part.communicator.concatenate(rows)
+    ids = part.communicator.concatenate(c["id"])
+    totals = [part.totals()[name] for name in ("mass", "kinetic", "internal", "momentum")]
+    totals += [part.boundary_impulse(), part.gravity_work()]
+    text = rows[np.argsort(ids)].tobytes() + np.concatenate([np.atleast_1d(t) for t in totals]).tobytes()
+    return len(ids), hashlib.sha256(text).hexdigest()
+
+
+def colliding_discs(threads):
+    """Two materials that meet near a symmetry plane and cross many blocks, one of them clamped."""
+    left = body(d.Ball((-0.42, 0.3), 0.25), 0.05, 8930.0, (900.0, -400.0))
+    clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
+    right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
+    return solid([left, right], (-1.0, 0.0), (1.0, 1.0), (1,), threads, block_cells=2, gravity=(0.0, -1e3)), 60
+
+
+def colliding_balls(threads):
+    """Two balls in three dimensions, a quarter of each."""
+    left = body(d.Ball((-0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (500.0, 0.0, 0.0))
+    right = body(d.Ball((0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (-700.0, 0.0, 0.0))
+    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), threads, block_cells=2), 25
+
+
+def main():
+    communicator = Communicator()
+    install_abort_on_exception(communicator)
+    for case in (colliding_discs, colliding_balls):
+        digests = []
+        for threads in (1, 2):
+            part, steps = case(threads)
+            start = part.blocks.block_of(part.columns["position"])
+            before = part.communicator.concatenate(np.stack([part.columns["id"], start], axis=1))
+            for _ in range(steps):
+                step(part)
+            end = part.blocks.block_of(part.columns["position"])
+            after = part.communicator.concatenate(np.stack([part.columns["id"], end], axis=1))
+            assert math.isfinite(part.totals()["internal"])
+            assert np.any(before[np.argsort(before[:, 0]), 1] != after[np.argsort(after[:, 0]), 1])
+            digests.append(digest(part))
+        assert digests[0] == digests[1]
+        if communicator.rank == 0:
+            print(case.__name__, *digests[0], flush=True)
+
+
+if __name__ == "__main__":
+    main()

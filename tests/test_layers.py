@@ -1,0 +1,102 @@
+"""The architecture as a test: who may import whom, and what lies at the top of the repository (ARCHITECTURE.md)."""
+
+import ast
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "distfsi"
+
+# From the top down. A folder imports only from those further down; those of one row do not know each other.
+LAYERS = (
+    {"__main__"},
+    {"study"},
+    {"simulation"},
+    {"model", "parts"},
+    {"kernels", "mesh", "device", "output", "scene"},
+    {"physics"},
+    {"errors", "__init__"},
+)
+DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
+ACROSS = {"kernels": "distfsi.device.markers"}
+
+ONLY_IN = {
+    "numba": "device",
+    "llvmlite": "device",
+    "cupy": "device",
+    "mpi4py": "mesh",
+    "h5py": "output",
+    "matplotlib": "output",
+}
+
+TOP_LEVEL = {
+    "pyproject.toml", "distfsi", "launch", "tests", "inputs", "README.md", "ARCHITECTURE.md", "docs", ".ci", "LICENSE",
+    "CHANGELOG.md", ".gitignore", ".pre-commit-config.yaml",
+}  # fmt: skip
+
+
+def layer_of(path: Path) -> str:
+    """The folder of the package that a file is in, or its own name if it lies at the package's top."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports_of(path: Path) -> set[str]:
+    """Full dotted names of all that a file imports, at any depth of its text."""
+    package = path.relative_to(ROOT).parent.parts
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) + 1 - node.level] if node.level else ()
+            module = [*start, *([node.module] if node.module else [])]
+            names.update(".".join([*module, alias.name]) for alias in node.names)
+    return names
+
+
+def allowed(layer: str, name: str) -> bool:
+    """Whether files of `layer` may import `name`."""
+    top, *inner = name.split(".")
+    if layer == "physics":
+        return top == "math" or name.startswith("distfsi.physics.")
+    if top != "distfsi":
+        return ONLY_IN.get(top, layer) == layer
+    target = inner[0] if inner and inner[0] in DEPTH else "__init__"
+    across = ACROSS.get(layer)
+    return target == layer or DEPTH[target] > DEPTH[layer] or (across is not None and name.startswith(across))
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_imports_only_from_the_layers_below(path):
+    assert layer_of(path) in DEPTH
+    assert not {name for name in imports_of(path) if not allowed(layer_of(path), name)}
+
+
+@pytest.mark.parametrize(
+    ("layer", "name", "verdict"),
+    [
+        ("simulation", "distfsi.parts.fluid.Fluid", True),
+        ("parts", "distfsi.simulation", False),
+        ("parts", "distfsi.model.fluid_model", False),
+        ("kernels", "distfsi.device.markers.row", True),
+        ("kernels", "distfsi.device.cpu", False),
+        ("mesh", "distfsi.errors.InputError", True),
+        ("mesh", "mpi4py.MPI", True),
+        ("parts", "mpi4py.MPI", False),
+        ("kernels", "numba", False),
+        ("physics", "math.sqrt", True),
+        ("physics", "numpy", False),
+        ("physics", "distfsi.errors", False),
+    ],
+)
+def test_the_layer_table(layer, name, verdict):
+    assert allowed(layer, name) is verdict
+
+
+def test_the_top_of_the_repository_holds_what_the_architecture_says():
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    present = {name.split("/")[0] for name in listed if (ROOT / name).exists()}
+    assert present <= TOP_LEVEL

@@ -1,0 +1,31 @@
+"""What the README shows is true."""
+
+import re
+from pathlib import Path
+
+from distfsi.scene import load
+
+ROOT = Path(__file__).parent.parent
+BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL))
+
+
+def test_the_two_commands_come_first_and_name_files_and_extras_that_exist():
+    run, test = BLOCKS["bash"].splitlines()
+    assert run == "pip install -e '.[mpi]' && mpiexec -n 2 python -m distfsi inputs/steel_tube.toml"
+    assert test == "pip install -e '.[test]' && pytest"
+    assert (ROOT / "inputs" / "steel_tube.toml").exists()
+
+
+def test_the_input_example_is_valid(tmp_path):
+    path = tmp_path / "example.toml"
+    path.write_text(BLOCKS["toml"])
+    scene = load(path)
+    assert [phase.name for phase in scene.fluid.phases] == ["tnt", "air"]
+    assert [body.name for body in scene.solid.bodies] == ["block"]
+    assert len(BLOCKS["toml"].splitlines()) <= 25
+
+
+def test_links_lead_to_files():
+    for document in [ROOT / "README.md", ROOT / "launch" / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\((?!http)([^)#]+)\)", document.read_text()):
+            assert (document.parent / target).exists(), f"{document.name}: {target}"

@@ -1,0 +1,229 @@
+"""The solid's formulas at single points, against exact values."""
+
+import math
+
+import numpy as np
+import pytest
+
+from distfsi.device import cpu
+from distfsi.physics import pair, smoothing, solid_eos, strength
+
+INF = math.inf
+# shear modulus, A, B, n, C, m, reference rate, room, melt, heat capacity, Taylor-Quinney
+STEEL = (77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
+ELASTIC = (80e9, INF, 0.0, 1.0, 0.0, 1.0, 1.0, 293.15, INF, INF, 0.0)
+PERFECTLY_PLASTIC = (80e9, 400e6, 0.0, 1.0, 0.0, 1.0, 1.0, 293.15, INF, INF, 0.0)
+NO_STRENGTH = (0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 293.15, INF, INF, 0.0)
+COPPER = (8930.0, 3940.0, 1.489, 0.0, 0.0, 2.0, 0.47, 1.0 - 2.0 / 2, -0.47 / 2)
+
+
+def compiled(dimensions, *formulas):
+    constants = {
+        "DIMENSIONS": dimensions,
+        "COMPONENTS": dimensions * (dimensions + 1) // 2,
+        "VISCOSITY_ALPHA": 1.0,
+        "VISCOSITY_BETA": 2.0,
+    }
+    return cpu.build(formulas, constants)
+
+
+def as_rows(matrix):
+    return tuple(tuple(map(float, row)) for row in matrix)
+
+
+# ---- smoothing -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_the_kernel_integrates_to_one_and_its_slope_is_its_derivative(dimensions):
+    kernels = compiled(dimensions, smoothing.smoothing_kernel, smoothing.smoothing_slope)
+    h = 0.7
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    r = h * (1.0 + nodes)  # 0 … 2h, where the kernel is a polynomial
+    W = np.array([kernels.smoothing_kernel(x * x, h) for x in r])
+    slope = np.array([kernels.smoothing_slope(x * x, h) for x in r])
+    shell = {1: 2.0 + 0.0 * r, 2: 2.0 * math.pi * r, 3: 4.0 * math.pi * r * r}[dimensions]
+    assert h * weights @ (W * shell) == pytest.approx(1.0, rel=1e-13)
+    # integral of r dW/dr over the ball is -dimensions
+    assert h * weights @ (slope * r * r * shell) == pytest.approx(-dimensions, rel=1e-13)
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_dilation_conserves_mass_and_particles_per_support(dimensions):
+    dilated = compiled(dimensions, smoothing.dilated).dilated
+    density, h = dilated(1000.0, 0.1, -30.0, 0.01)
+    assert density == pytest.approx(1000.0 * math.exp(0.3))
+    assert density * h**dimensions == pytest.approx(1000.0 * 0.1**dimensions)
+
+
+# ---- pairs ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_pair_forces_are_opposite_to_the_bit_and_energy_balances(dimensions):
+    kernels = compiled(
+        dimensions,
+        pair.approach_speed,
+        pair.viscosity,
+        pair.pair_acceleration,
+        pair.pair_heating,
+        smoothing.smoothing_slope,
+    )
+    random = np.random.default_rng(1)
+    components = dimensions * (dimensions + 1) // 2
+    dx, v_i, v_j = random.normal(size=(3, dimensions)) * 0.3
+    S_i, S_j = random.normal(size=(2, components))
+    dv = v_i - v_j
+    distance2 = float(dx @ dx)
+    approach = kernels.approach_speed(tuple(dv), tuple(dx), distance2, 1.0)
+    assert approach == kernels.approach_speed(tuple(-dv), tuple(-dx), distance2, 1.0)
+    Pi = kernels.viscosity(0.3, 2.0, 1.1)
+    assert Pi == pytest.approx(0.3 * (2.0 + 2.0 * 0.3) / 1.1)
+    slope = kernels.smoothing_slope(distance2, 1.0)
+    a_i = np.array(kernels.pair_acceleration(tuple(dx), slope, tuple(S_i + S_j), 0.7, 1.3, Pi))
+    a_j = np.array(kernels.pair_acceleration(tuple(-dx), slope, tuple(S_j + S_i), 0.7, 1.3, Pi))
+    assert np.array_equal(a_i, -a_j)
+    e_i = kernels.pair_heating(tuple(dv), tuple(dx), slope, tuple(S_i), 0.7, 1.3, Pi)
+    e_j = kernels.pair_heating(tuple(-dv), tuple(-dx), slope, tuple(S_j), 0.7, 1.3, Pi)
+    assert a_i @ v_i + a_j @ v_j + e_i + e_j == pytest.approx(0.0, abs=1e-14)
+
+
+def test_viscosity_and_pressure_push_apart():
+    kernels = compiled(2, pair.approach_speed, pair.pair_acceleration, smoothing.smoothing_slope)
+    dx = (0.5, 0.0)
+    assert kernels.approach_speed((-1.0, 0.0), dx, 0.25, 1.0) > 0.0
+    assert kernels.approach_speed((1.0, 0.0), dx, 0.25, 1.0) == 0.0
+    slope = kernels.smoothing_slope(0.25, 1.0)
+    for pressures, Pi in ((1.0, 0.0), (0.0, 1.0)):
+        assert kernels.pair_acceleration(dx, slope, (0.0, 0.0, 0.0), pressures, 1.0, Pi)[0] > 0.0
+
+
+# ---- equation of state ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("u", "p", "compression"), [(250.0, 9.627e9, 1.0615), (500.0, 20.916e9, 1.1195)])
+def test_copper_hugoniot(u, p, compression):
+    pressure = compiled(1, solid_eos.solid_pressure).solid_pressure
+    density = COPPER[0] / (1.0 - u / (COPPER[1] + COPPER[2] * u))
+    assert density / COPPER[0] == pytest.approx(compression, rel=1e-4)
+    exact = COPPER[0] * (COPPER[1] + COPPER[2] * u) * u
+    assert exact == pytest.approx(p, rel=1e-4)
+    assert pressure(density, 0.5 * u * u, COPPER) == pytest.approx(exact, rel=1e-13)
+
+
+def test_the_linear_law_is_linear():
+    kernels = compiled(1, solid_eos.solid_pressure, solid_eos.bulk_modulus)
+    K, rho0 = 3.25e6, 1000.0
+    eos = (rho0, math.sqrt(K / rho0), 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for density in (700.0, 999.0, 1000.0, 1300.0):
+        p = kernels.solid_pressure(density, 1e5, eos)
+        assert p == pytest.approx(K * (density / rho0 - 1.0), rel=1e-14, abs=1e-8)
+        assert kernels.bulk_modulus(density, 1e5, p, eos) == pytest.approx(K * density / rho0, rel=1e-14)
+
+
+@pytest.mark.parametrize("compression", [0.97, 1.0001, 1.05, 1.2])
+def test_the_bulk_modulus_is_the_slope_of_the_isentrope(compression):
+    kernels = compiled(1, solid_eos.solid_pressure, solid_eos.bulk_modulus)
+    steel = (7830.0, 4569.0, 1.49, 0.1, 0.05, 2.17, 0.46, 1.0 - 2.17 / 2, -0.46 / 2)
+    rho, e, d = compression * steel[0], 2e4, 1e-5
+    p = kernels.solid_pressure(rho, e, steel)
+    de = p / rho * d
+    ahead = kernels.solid_pressure(rho * (1.0 + d), e + de, steel)
+    behind = kernels.solid_pressure(rho * (1.0 - d), e - de, steel)
+    assert kernels.bulk_modulus(rho, e, p, steel) == pytest.approx((ahead - behind) / (2.0 * d), rel=1e-7)
+
+
+def test_longitudinal_sound_speed_of_steel():
+    G, K, rho = 80.23e9, 164.29e9, 7850.0  # E = 207 GPa, nu = 0.29
+    speed = compiled(3, solid_eos.solid_sound_speed).solid_sound_speed
+    eos = (rho, math.sqrt(K / rho), 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert speed(rho, K, G, eos) == pytest.approx(5878.0, rel=1e-3)
+
+
+# ---- strength ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("strain", "rate", "temperature", "megapascal"),
+    [
+        (0.0, 1.0, 273.0, 792.00),
+        (0.1, 1.0, 273.0, 1072.27),
+        (0.1, 1e4, 273.0, 1210.53),
+        (0.1, 1e4, 700.0, 883.18),
+        (0.5, 1e4, 1033.0, 701.62),
+        (0.0, 1e-3, 100.0, 792.00),
+        (1.0, 1e5, 1500.0, 299.25),
+        (1.0, 1e5, 2000.0, 0.0),
+    ],
+)
+def test_johnson_cook_yield_stress(strain, rate, temperature, megapascal):
+    yield_stress = compiled(3, strength.yield_stress).yield_stress
+    assert yield_stress(strain, rate, temperature, STEEL) * 1e-6 == pytest.approx(megapascal, abs=0.01)
+
+
+def test_the_other_strengths_are_cases_of_johnson_cook():
+    kernels = compiled(3, strength.yield_stress, strength.plastic_increment)
+    assert kernels.yield_stress(0.3, 1e4, 500.0, ELASTIC) == INF
+    assert kernels.yield_stress(0.3, 1e4, 500.0, PERFECTLY_PLASTIC) == 400e6
+    assert kernels.yield_stress(0.0, 0.0, 500.0, NO_STRENGTH) == 0.0
+    assert kernels.plastic_increment(640e6, 0.3, 500.0, 1e-7, PERFECTLY_PLASTIC) == pytest.approx(
+        240e6 / 240e9, rel=1e-14
+    )
+
+
+@pytest.mark.parametrize("before", [0.0, 1e-6, 0.01, 1.0])
+@pytest.mark.parametrize("dt", [1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize("overshoot", [1e-5, 0.01, 0.3, 5.0])
+def test_the_return_ends_on_the_yield_surface(before, dt, overshoot):
+    kernels = compiled(3, strength.yield_stress, strength.plastic_increment)
+    first = kernels.yield_stress(before, 0.0, 400.0, STEEL)
+    trial = (1.0 + overshoot) * first
+    increment = kernels.plastic_increment(trial, before, 400.0, dt, STEEL)
+    stress = trial - 3.0 * STEEL[0] * increment
+    after = kernels.yield_stress(before + increment, increment / dt, 400.0, STEEL)
+    assert stress == pytest.approx(after, rel=1e-4 if before == 0.0 else 1e-6)
+
+
+def test_von_mises_counts_the_stress_out_of_the_plane():
+    assert compiled(1, strength.von_mises).von_mises((2.0,)) == pytest.approx(3.0)
+    plane = compiled(2, strength.von_mises).von_mises
+    space = compiled(3, strength.von_mises).von_mises
+    assert plane((2.0, -0.5, 0.7)) == pytest.approx(space((2.0, -0.5, -1.5, 0.7, 0.0, 0.0)))
+    assert space((0.0, 0.0, 0.0, 1.0, 0.0, 0.0)) == pytest.approx(math.sqrt(3.0))
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_simple_shear_follows_the_jaumann_rate(dimensions):
+    trial_deviator = compiled(dimensions, strength.trial_deviator).trial_deviator
+    gradient = np.zeros((dimensions, dimensions))
+    gradient[0, 1] = 1.0
+    xy = {2: 2, 3: 3}[dimensions]
+    S, steps = (0.0,) * (dimensions * (dimensions + 1) // 2), 4000
+    measured = {}
+    for step in range(1, 4 * steps + 1):
+        S = trial_deviator(S, as_rows(gradient), 1.0, 1.0 / steps)
+        measured[step / steps] = S[xy]
+    for strain, exact in ((1, 0.8415), (2, 0.9093), (4, -0.7568)):
+        assert measured[strain] == pytest.approx(exact, abs=5e-4)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_rigid_rotation_keeps_the_stress(dimensions):
+    trial_deviator = compiled(dimensions, strength.trial_deviator).trial_deviator
+    von_mises = compiled(dimensions, strength.von_mises).von_mises
+    axis = np.array([0.0, 0.0, 1.0]) if dimensions == 2 else np.array([1.0, 2.0, -2.0]) / 3.0
+    spin = np.cross(np.eye(3), axis)[:dimensions, :dimensions].T
+    start = {2: (3.0, 1.0, 0.5), 3: (3.0, 1.0, -4.0, 0.5, -0.7, 0.2)}[dimensions]
+    S, steps = start, 3600
+    for _ in range(steps):
+        S = trial_deviator(S, as_rows(spin), 1e11, 2.0 * math.pi / steps)
+    assert von_mises(S) == pytest.approx(von_mises(start), rel=1e-12)
+    assert np.allclose(S, start, rtol=0.0, atol=1e-10)
+
+
+def test_a_quarter_turn_turns_the_stress_the_way_the_material_turns():
+    trial_deviator = compiled(2, strength.trial_deviator).trial_deviator
+    S = (2.0, 0.0, 0.3)
+    for _ in range(100):
+        S = trial_deviator(S, ((0.0, -1.0), (1.0, 0.0)), 1.0, 0.25 * math.pi / 100)  # 45 degrees counterclockwise
+    assert np.allclose(S, (0.7, 1.3, 1.0), rtol=0.0, atol=1e-8)
