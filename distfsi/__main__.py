@@ -31,6 +31,7 @@ def parser() -> argparse.ArgumentParser:
             )
     bench = commands.add_parser("bench", help="measure this machine's speed, as JSON")
     bench.add_argument("--threads", type=int, help="threads per rank")
+    bench.add_argument("--only", metavar="PART", help="only benchmarks whose name holds PART")
     study = commands.add_parser("study", help="compare with reference answers")
     study.add_argument("name", choices=("steel_tube",), help="which study")
     study.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the input")
@@ -60,7 +61,7 @@ def main(words: list[str]) -> None:
     elif arguments.command == "bench":
         from distfsi.study import bench
 
-        bench.main(communicator, arguments.threads)
+        bench.main(communicator, arguments.threads, arguments.only)
     else:
         from distfsi.study import steel_tube
 

@@ -11,7 +11,6 @@ import numpy as np
 import psutil
 from threadpoolctl import threadpool_limits
 
-from distfsi.parts.accounts import Accounts
 from distfsi.device.cpu import Team
 from distfsi.errors import Diverged
 from distfsi.mesh.blocks import Blocks, Grid
@@ -22,6 +21,7 @@ from distfsi.output.history import History
 from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
 from distfsi.output.schedule import Every
+from distfsi.parts.accounts import Accounts
 from distfsi.parts.coupling import Coupling
 from distfsi.parts.fluid import SSP_RK3, Fluid
 from distfsi.parts.solid import Solid

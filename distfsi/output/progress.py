@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time as clock
 
-from rich.progress import BarColumn, Progress as RichProgress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as RichProgress
 
 from distfsi.output.interfaces import Communicator
 

@@ -49,19 +49,22 @@ class Accounts:
         }
         balance, size = np.zeros(len(self.conserved)), np.zeros(len(self.conserved))
 
-        def book(label: str, amounts: np.ndarray, sign: float = 1.0) -> None:
+        def book(label: str, amounts: np.ndarray, sign: float = 1.0, magnitude: np.ndarray | None = None) -> None:
             nonlocal balance, size
             values.update({f"{label} {name}": amount for name, amount in zip(self.conserved, amounts, strict=True)})
-            balance, size = balance + sign * amounts, size + np.abs(amounts)
+            balance, size = balance + sign * amounts, size + (np.abs(amounts) if magnitude is None else magnitude)
 
         left = np.zeros(len(self.conserved))
         if self.fluid:
-            book("fluid", self.fluid.totals(self.coupling.covered if self.coupling else None))
+            totals, magnitude = self.fluid.totals(self.coupling.covered if self.coupling else None)
+            book("fluid", totals, magnitude=magnitude)
             left = left + self.fluid.left_domain()
         if self.solid:
             totals = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])
-            balance, size = balance + amounts, size + np.abs(amounts)
+            magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
+            magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"])
+            balance, size = balance + amounts, size + magnitude
             values["solid mass [kg]"] = totals["mass"]
             values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}
             values["solid kinetic energy [J]"] = totals["kinetic"]

@@ -106,14 +106,15 @@ class Fluid:
     def advance_stage(self, stage: Stage, dt: float) -> None:
         """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
         self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
-        self._advance(self._ready_tiles, stage, dt)
+        self.advance_tiles(self._ready_tiles, stage, dt)
         self.exchange.finish()
-        self._advance(self._waiting_tiles, stage, dt)
+        self.advance_tiles(self._waiting_tiles, stage, dt)
         if stage.number == LAST:
             a, b, c = self._buffers
             self._buffers = [b, a, c]
 
-    def _advance(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
+    def advance_tiles(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
+        """Advance the tiles of the given numbers by one stage."""
         output = self._buffers[1 if stage.number == LAST else stage.number + 1]
         real = output.dtype.type
         rates = (real(dt / h) for h in self.blocks.grid.spacing)
@@ -146,15 +147,24 @@ class Fluid:
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
         return self.state[(block, slice(None), *(slice(a, a + b) for a, b in zip(g, n)))]
 
-    def totals(self, covered: np.ndarray | None = None) -> np.ndarray:
-        """Masses, momentum and energy (conserved,) of all ranks' cells, without those that are `covered` (local blocks, Z, Y, X)."""
-        volume, sums = self._cell_volume(), np.zeros((self.blocks.local_count, self.model.conserved))
+    def memory(self) -> int:
+        """Bytes of this rank's fields."""
+        return sum(buffer.nbytes for buffer in self._buffers)
+
+    def totals(self, covered: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Masses, momentum and energy (conserved,) of all ranks' cells, and the sums of their absolute values.
+
+        Cells that are `covered` (local blocks, Z, Y, X) are left out.
+        """
+        sums = np.zeros((self.blocks.local_count, 2, self.model.conserved))
         for block in range(self.blocks.local_count):
-            cells = self.cells(block)[: self.model.conserved]
+            cells = self.cells(block)[: self.model.conserved].astype(np.float64)
             if covered is not None:
                 cells = np.where(self._active(covered, block), 0.0, cells)
-            sums[block] = cells.sum(axis=(1, 2, 3), dtype=np.float64) * volume
-        return self.blocks.sum(sums)
+            sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
+        sums *= self._cell_volume()
+        totals = self.blocks.sum(sums.reshape(len(sums), -1))
+        return totals[: self.model.conserved], totals[self.model.conserved :]
 
     def left_domain(self) -> np.ndarray:
         """What has left through the domain's sides so far (conserved,); the wall's impulse is momentum that has left."""

@@ -1,0 +1,156 @@
+"""Coupled scenes for the tests, and the run that every rank makes; started by test_coupling.py.
+
+mpi_coupling.py    runs the cases with 1 and 2 threads and other blocks; rank 0 prints what must not depend on the number of ranks
+"""
+
+import hashlib
+
+import numpy as np
+
+from distfsi.device.cpu import Team
+from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.mesh.communicator import Communicator, install_abort_on_exception
+from distfsi.model import fluid_model
+from distfsi.parts.coupling import Coupling
+from distfsi.parts.fluid import SSP_RK3, Fluid
+from distfsi.parts.solid import Solid
+from distfsi.scene import description as d
+
+AIR = (d.Phase("air", d.IdealGas(1.4)),)
+AIR_AND_WATER = (*AIR, d.Phase("water", d.StiffenedGas(4.4, 60.0)))
+
+
+def gas(density, pressure, velocity, phase=0):
+    return d.FluidState(phase, density, pressure, tuple(map(float, velocity)))
+
+
+def body(shape, spacing, density, velocity, fixed=None, stiffness=50.0):
+    """An elastic body; sound speeds near those of the gas keep the steps long."""
+    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), d.LinearEos(stiffness), d.Elastic(0.4 * stiffness), fixed)
+
+
+class Coupled:
+    """Fluid, solid and coupling of a scene, and the step that joins them."""
+
+    def __init__(
+        self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64"
+    ):  # fmt: skip
+        D = len(lower)
+        kinds = kinds or (("wall", "wall"),) * D
+        regions = tuple(d.Region(state, shape) for state, shape in regions)
+        scene = d.Scene(
+            title="test",
+            domain=d.Domain(lower, upper, cells, kinds),
+            time=d.Time(1.0, 0.4, None),
+            gravity=(0.0,) * D,
+            fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
+            solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0),
+            output=d.Output("", 0.0, 1),
+            performance=d.Performance((block,) * D, (block,) * D),
+        )
+        self.communicator = Communicator()
+        self.blocks = Blocks(Grid.of(lower, upper, cells, kinds), scene.performance.block_cells, self.communicator)
+        team, model = Team(threads), fluid_model(scene)
+        self.fluid = Fluid(scene, model, self.blocks, team)
+        self.solid = Solid(scene, self.blocks, self.communicator, team)
+        self.coupling = Coupling(scene, model, self.fluid, self.solid, self.blocks, team)
+
+    def step(self):
+        """One stable step; returns its length and the impulse (D,) on all particles."""
+        fluid, solid, coupling = self.fluid, self.solid, self.coupling
+        solid.prepare(coupling.reach)
+        coupling.classify()
+        for stage in SSP_RK3:
+            fluid.exchange_ghosts(stage)
+            coupling.fill(stage)
+            if stage.number == 0:
+                rates = [fluid.fastest_signal() / 0.4, 1.0 / solid.time_step()[0]]
+                dt = 1.0 / self.communicator.maximum(np.array(rates)).max()
+            fluid.advance_stage(stage, dt)
+            coupling.collect_force(stage, dt)
+        impulse = coupling.impulse()
+        solid.advance(dt, impulse)
+        coupling.book_work()
+        solid.migrate()
+        return dt, self.communicator.concatenate(impulse).sum(axis=0)
+
+    def balance(self):
+        """Masses, momentum and energy that nothing may change."""
+        fluid, solid, coupling = self.fluid, self.solid, self.coupling
+        t = solid.totals()
+        particles = [0.0] * fluid.model.phases + [*t["momentum"] - solid.boundary_impulse(), t["kinetic"] + t["internal"]]
+        created = sum(coupling.ledger().values())
+        return fluid.totals(coupling.covered) + fluid.left_domain() + np.array(particles) - created
+
+    def grid_of(self, field):
+        """(variables, z, y, x): the active cells of a field (local blocks, variables, Z, Y, X) of all ranks, on every rank."""
+        cells = self.blocks.grid.cells[::-1]
+        whole, ghosts = np.zeros((field.shape[1], *cells)), self.blocks.grid.ghosts[::-1]
+        for b in range(self.blocks.local_count):
+            origin, extent = self.blocks.origin[b][::-1], self.blocks.extent[b][::-1]
+            inner = tuple(slice(g, g + n) for g, n in zip(ghosts, extent, strict=True))
+            whole[(slice(None), *(slice(o, o + n) for o, n in zip(origin, extent, strict=True)))] = field[(b, slice(None), *inner)]
+        return self.communicator.concatenate(whole[None]).sum(axis=0)
+
+    @property
+    def covered(self):
+        """(z, y, x) of the whole grid."""
+        return self.grid_of(self.coupling.covered[:, None])[0] > 0
+
+    def particles(self):
+        """All particles of all ranks by id: positions, velocities, energies, densities."""
+        c = self.solid.columns
+        rows = np.column_stack([c["position"], c["velocity"], c["energy"], c["density"]])
+        rows, ids = self.communicator.concatenate(rows), self.communicator.concatenate(c["id"])
+        return rows[np.argsort(ids)]
+
+    def digest(self):
+        """Hash of all that must not depend on ranks, threads and blocks."""
+        rest = self.covered
+        state = np.where(rest, 0.0, self.grid_of(self.fluid.state))
+        return hashlib.sha256(state.tobytes() + rest.tobytes() + self.particles().tobytes()).hexdigest()
+
+
+# ---- cases ----------------------------------------------------------------------------------------------------------
+
+
+def flying_discs(threads, block):
+    """Two discs, one of them clamped, hit by a shock near a symmetry plane and an outflow."""
+    free = body(d.Ball((0.3, 0.05), 0.15), 0.02, 3.0, (0.8, 0.1))
+    clamped = body(d.Ball((0.75, 0.4), 0.1), 0.02, 3.0, (0.0, 0.0), d.HalfSpace((0.75, 0.4), (1.0, 0.0)))
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 4.0, (1.0, 0)), d.Box((0.0, 0.0), (0.1, 1.0)))]
+    kinds = (("wall", "outflow"), ("symmetry", "wall"))
+    return Coupled([free, clamped], regions, (0.0, 0.0), (1.0, 0.6), (25, 15), kinds, block, threads), 80
+
+
+def sinking_plate(threads, block):
+    """A plate with both phases around it in three dimensions, a quarter of it."""
+    plate = body(d.Box((0.3, 0.0, 0.0), (0.5, 0.25, 0.3)), 0.05, 3.0, (1.5, 0, 0))
+    regions = [(gas(1.0, 1.0, (0, 0, 0)), None), (gas(5.0, 4.0, (0, 0, 0), 1), d.Box((0.6, 0.0, 0.0), (1.0, 1.0, 1.0)))]
+    kinds = (("wall", "outflow"), ("symmetry", "wall"), ("symmetry", "outflow"))
+    lower, upper = (0.0, 0.0, 0.0), (1.0, 0.5, 0.5)
+    return Coupled([plate], regions, lower, upper, (10, 5, 5), kinds, block, threads, AIR_AND_WATER), 25
+
+
+def main():
+    communicator = Communicator()
+    install_abort_on_exception(communicator)
+    for case, blocks in ((flying_discs, (4, 7)), (sinking_plate, (3, 4))):
+        digests = []
+        for threads, block in ((1, blocks[0]), (2, blocks[1])):
+            coupled, steps = case(threads, block)
+            before, scale = coupled.balance(), 0.0
+            for _ in range(steps):
+                coupled.step()
+                scale = max(scale, np.abs(coupled.fluid.totals()).max())
+            ledger = coupled.coupling.ledger()
+            assert np.abs(coupled.balance() - before).max() < 1e-12 * scale
+            assert all(np.abs(ledger[cause][-1]) > 0.0 for cause in ("wall", "covered", "fresh"))
+            digests.append(coupled.digest())
+        assert digests[0] == digests[1], case.__name__
+        if communicator.rank == 0:
+            print(case.__name__, digests[0], [amounts.tobytes().hex() for amounts in ledger.values()], flush=True)
+
+
+if __name__ == "__main__":
+    main()
