@@ -1,6 +1,6 @@
 """Coupled scenes for the tests, and the run that every rank makes; started by test_coupling.py.
 
-mpi_coupling.py    runs the cases with 1 and 2 threads and other blocks; rank 0 prints what must not depend on the number of ranks
+mpi_coupling.py    runs the cases with 1 and 2 threads and other blocks; rank 0 prints what must not depend on the ranks
 """
 
 import hashlib
@@ -26,7 +26,16 @@ def gas(density, pressure, velocity, phase=0):
 
 def body(shape, spacing, density, velocity, fixed=None, stiffness=50.0):
     """An elastic body; sound speeds near those of the gas keep the steps long."""
-    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), d.LinearEos(stiffness), d.Elastic(0.4 * stiffness), fixed)
+    return d.Body(
+        "body",
+        shape,
+        spacing,
+        density,
+        tuple(map(float, velocity)),
+        d.LinearEos(stiffness),
+        d.Elastic(0.4 * stiffness),
+        fixed,
+    )
 
 
 class Coupled:
@@ -78,18 +87,23 @@ class Coupled:
         """Masses, momentum and energy that nothing may change."""
         fluid, solid, coupling = self.fluid, self.solid, self.coupling
         t = solid.totals()
-        particles = [0.0] * fluid.model.phases + [*t["momentum"] - solid.boundary_impulse(), t["kinetic"] + t["internal"]]
+        particles = [0.0] * fluid.model.phases + [
+            *t["momentum"] - solid.boundary_impulse(),
+            t["kinetic"] + t["internal"],
+        ]
         created = sum(coupling.ledger().values())
-        return fluid.totals(coupling.covered) + fluid.left_domain() + np.array(particles) - created
+        return fluid.totals(coupling.covered)[0] + fluid.left_domain() + np.array(particles) - created
 
     def grid_of(self, field):
-        """(variables, z, y, x): the active cells of a field (local blocks, variables, Z, Y, X) of all ranks, on every rank."""
+        """(variables, z, y, x): the cells of all ranks of a field (local blocks, variables, Z, Y, X), on every rank."""
         cells = self.blocks.grid.cells[::-1]
         whole, ghosts = np.zeros((field.shape[1], *cells)), self.blocks.grid.ghosts[::-1]
         for b in range(self.blocks.local_count):
             origin, extent = self.blocks.origin[b][::-1], self.blocks.extent[b][::-1]
             inner = tuple(slice(g, g + n) for g, n in zip(ghosts, extent, strict=True))
-            whole[(slice(None), *(slice(o, o + n) for o, n in zip(origin, extent, strict=True)))] = field[(b, slice(None), *inner)]
+            whole[(slice(None), *(slice(o, o + n) for o, n in zip(origin, extent, strict=True)))] = field[
+                (b, slice(None), *inner)
+            ]
         return self.communicator.concatenate(whole[None]).sum(axis=0)
 
     @property
@@ -142,7 +156,7 @@ def main():
             before, scale = coupled.balance(), 0.0
             for _ in range(steps):
                 coupled.step()
-                scale = max(scale, np.abs(coupled.fluid.totals()).max())
+                scale = max(scale, np.abs(coupled.fluid.totals()[0]).max())
             ledger = coupled.coupling.ledger()
             assert np.abs(coupled.balance() - before).max() < 1e-12 * scale
             assert all(np.abs(ledger[cause][-1]) > 0.0 for cause in ("wall", "covered", "fresh"))

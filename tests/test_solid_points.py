@@ -61,41 +61,64 @@ def test_dilation_conserves_mass_and_particles_per_support(dimensions):
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
 def test_pair_forces_are_opposite_to_the_bit_and_energy_balances(dimensions):
-    kernels = compiled(
-        dimensions,
-        pair.approach_speed,
-        pair.viscosity,
-        pair.pair_acceleration,
-        pair.pair_heating,
-        smoothing.smoothing_slope,
-    )
+    kernels = compiled(dimensions, pair.approach_speed, pair.viscosity, pair.pair_acceleration, pair.pair_heating)
     random = np.random.default_rng(1)
-    components = dimensions * (dimensions + 1) // 2
     dx, v_i, v_j = random.normal(size=(3, dimensions)) * 0.3
-    S_i, S_j = random.normal(size=(2, components))
-    dv = v_i - v_j
-    distance2 = float(dx @ dx)
+    S_i, S_j = random.normal(size=(2, dimensions, dimensions))
+    dv, distance2, slope = v_i - v_j, float(dx @ dx), -0.8
     approach = kernels.approach_speed(tuple(dv), tuple(dx), distance2, 1.0)
     assert approach == kernels.approach_speed(tuple(-dv), tuple(-dx), distance2, 1.0)
     Pi = kernels.viscosity(0.3, 2.0, 1.1)
     assert Pi == pytest.approx(0.3 * (2.0 + 2.0 * 0.3) / 1.1)
-    slope = kernels.smoothing_slope(distance2, 1.0)
-    a_i = np.array(kernels.pair_acceleration(tuple(dx), slope, tuple(S_i + S_j), 0.7, 1.3, Pi))
-    a_j = np.array(kernels.pair_acceleration(tuple(-dx), slope, tuple(S_j + S_i), 0.7, 1.3, Pi))
+    a_i = np.array(kernels.pair_acceleration(tuple(dx), slope, as_rows(S_i + S_j), 1.3, Pi))
+    a_j = np.array(kernels.pair_acceleration(tuple(-dx), slope, as_rows(S_j + S_i), 1.3, Pi))
     assert np.array_equal(a_i, -a_j)
-    e_i = kernels.pair_heating(tuple(dv), tuple(dx), slope, tuple(S_i), 0.7, 1.3, Pi)
-    e_j = kernels.pair_heating(tuple(-dv), tuple(-dx), slope, tuple(S_j), 0.7, 1.3, Pi)
+    e_i = kernels.pair_heating(tuple(dv), tuple(dx), slope, as_rows(S_i), 1.3, Pi)
+    e_j = kernels.pair_heating(tuple(-dv), tuple(-dx), slope, as_rows(S_j), 1.3, Pi)
     assert a_i @ v_i + a_j @ v_j + e_i + e_j == pytest.approx(0.0, abs=1e-14)
 
 
-def test_viscosity_and_pressure_push_apart():
-    kernels = compiled(2, pair.approach_speed, pair.pair_acceleration, smoothing.smoothing_slope)
-    dx = (0.5, 0.0)
-    assert kernels.approach_speed((-1.0, 0.0), dx, 0.25, 1.0) > 0.0
+def test_viscosity_and_pressure_push_apart_and_heat():
+    kernels = compiled(2, pair.approach_speed, pair.pair_acceleration, pair.pair_heating)
+    dx, nearing, nothing, pressure = (0.5, 0.0), (-1.0, 0.0), np.zeros((2, 2)), -np.eye(2)
+    assert kernels.approach_speed(nearing, dx, 0.25, 1.0) == pytest.approx(0.5 / 0.26)
     assert kernels.approach_speed((1.0, 0.0), dx, 0.25, 1.0) == 0.0
-    slope = kernels.smoothing_slope(0.25, 1.0)
-    for pressures, Pi in ((1.0, 0.0), (0.0, 1.0)):
-        assert kernels.pair_acceleration(dx, slope, (0.0, 0.0, 0.0), pressures, 1.0, Pi)[0] > 0.0
+    for stress, Pi in ((pressure, 0.0), (nothing, 1.0)):
+        assert kernels.pair_acceleration(dx, -1.0, as_rows(stress), 1.0, Pi)[0] > 0.0
+        assert kernels.pair_heating(nearing, dx, -1.0, as_rows(stress), 1.0, Pi) > 0.0
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_corrected_gradients_are_exact_at_a_ragged_surface(dimensions):
+    kernels = compiled(dimensions, pair.pair_gradient, pair.gradient_correction, smoothing.smoothing_slope)
+    random = np.random.default_rng(2)
+    neighbours = random.uniform(-2.0, 2.0, size=(200, dimensions))
+    neighbours[:, 0] = -np.abs(neighbours[:, 0])  # none on one side
+    volume = 0.5 * 4.0**dimensions / len(neighbours)
+    exact = random.normal(size=(dimensions, dimensions))
+    gradient, moment = np.zeros((2, dimensions, dimensions))
+    for x in neighbours[(neighbours**2).sum(axis=1) < 4.0]:
+        slope = kernels.smoothing_slope(float(x @ x), 1.0)
+        gradient += kernels.pair_gradient(tuple(-exact @ x), tuple(-x), slope, volume)
+        moment += kernels.pair_gradient(tuple(-x), tuple(-x), slope, volume)
+    correction = np.array(kernels.gradient_correction(as_rows(moment)))
+    assert np.abs(gradient - exact).max() > 0.1
+    assert np.allclose(gradient @ correction, exact, rtol=0.0, atol=1e-12)
+
+
+def test_too_few_neighbours_are_not_corrected():
+    correction = compiled(3, pair.gradient_correction).gradient_correction
+    assert np.array_equal(correction(as_rows(np.zeros((3, 3)))), np.eye(3))
+    assert np.array_equal(correction(as_rows(np.diag([1.0, 1.0, 0.04]))), np.eye(3))
+    assert np.array_equal(correction(as_rows(np.diag([1.0, 0.5, 0.5]))), np.diag([1.0, 2.0, 2.0]))
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_the_gradient_at_mid_step_belongs_to_the_positions_half_a_step_later(dimensions):
+    mid_step = compiled(dimensions, pair.mid_step).mid_step
+    gradient, dt = np.random.default_rng(3).normal(size=(dimensions, dimensions)), 0.3
+    moved = np.eye(dimensions) + 0.5 * dt * gradient
+    assert np.allclose(mid_step(as_rows(gradient), dt), gradient @ np.linalg.inv(moved), rtol=0.0, atol=1e-14)
 
 
 # ---- equation of state ---------------------------------------------------------------------------------------------

@@ -33,7 +33,8 @@ class Emission:
             return self._names[key]
         name = function.__name__ + suffix
         if name in self.functions or name in self._names.values():
-            raise NotInSubset(f"two functions would be emitted as {name}")
+            other = next(f for (f, _), emitted in self._names.items() if emitted == name)
+            raise NotInSubset(f"{Source(function).place}: {name} is also the name of {Source(other).place}")
         self._names[key] = name
         source = Source(function)
         tree = Fold(
@@ -62,9 +63,9 @@ class Emission:
             bound = self.bindings[name]
             emitted = self.add(bound.function, bound.constants, "__" + name)
         else:
-            function = caller.__globals__.get(name)
+            function = caller.__globals__[name]
             if not callable(function) or not hasattr(function, "__code__"):
-                raise NotInSubset(f"{Source(caller).place}: {name} is not a formula and the scene binds nothing to it")
+                raise KeyError(name)
             emitted = self.add(function, scope, suffix if scope else "")
         return emitted, self._constant_result(emitted)
 

@@ -14,8 +14,8 @@ import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max", "floor")
-KERNEL_WORDS = ("load", "store", "workspace", "range", "int", "len", "real")
+MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
+KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "len", "real")
 
 _OPERATORS = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -102,13 +102,25 @@ class Fold(ast.NodeTransformer):
             n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
         }
         assigned = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
-        loops = [n for n in ast.walk(tree) if isinstance(n, (ast.For, ast.While, ast.AugAssign))]
+        sometimes = (ast.For, ast.While, ast.AugAssign, *((ast.If,) if self.in_kernel else ()))
+        parts = [n for n in ast.walk(tree) if isinstance(n, sometimes)]
         inside = {
-            n.id for loop in loops for n in ast.walk(loop) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+            n.id for part in parts for n in ast.walk(part) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
         }
         self.propagate = {name for name in assigned if assigned.count(name) == 1} - inside
         tree.body = self.statements(tree.body)
+        if not self.in_kernel:
+            self.refuse_integers(tree)
         return ast.fix_missing_locations(tree)
+
+    def refuse_integers(self, tree: ast.AST) -> None:
+        """Integers are for indices and for the arguments of other formulas; elsewhere they turn float32 into float64."""
+        for node in ast.iter_child_nodes(tree):
+            index = isinstance(tree, ast.Subscript) and node is tree.slice
+            argument = isinstance(tree, ast.Call) and tree.func.id not in MATH_WORDS
+            if isinstance(node, ast.Constant) and type(node.value) is int and not (index or argument):
+                raise self.refuse(node, f"write {node.value}.0: an integer would turn float32 into float64")
+            self.refuse_integers(node)
 
     # ---- statements ----------------------------------------------------------------------------------------------------
 
@@ -119,6 +131,8 @@ class Fold(ast.NodeTransformer):
                 continue  # docstring
             result = self.visit(statement)
             out += result if isinstance(result, list) else [result] if result is not None else []
+            if out and isinstance(out[-1], ast.Return):
+                break
         return out
 
     def visit_Assign(self, node: ast.Assign):
@@ -208,6 +222,10 @@ class Fold(ast.NodeTransformer):
 
     def visit_BinOp(self, node: ast.BinOp):
         node.left, node.right = self.visit(node.left), self.visit(node.right)
+        return self.combined(node)
+
+    def combined(self, node: ast.BinOp) -> ast.expr:
+        """An operation whose operands are folded already."""
         if type(node.op) not in _OPERATORS:
             raise self.refuse(node, f"operator {type(node.op).__name__} is not in the subset")
         left, right = node.left, node.right
@@ -216,10 +234,6 @@ class Fold(ast.NodeTransformer):
         simpler = self.identity(node)
         if simpler is not None:
             return simpler
-        if not self.in_kernel:
-            for side in (left, right):
-                if isinstance(side, ast.Constant) and type(side.value) is int:
-                    raise self.refuse(node, f"write {side.value}.0: an integer would turn float32 into float64")
         return node
 
     @staticmethod
@@ -246,13 +260,17 @@ class Fold(ast.NodeTransformer):
 
     def visit_UnaryOp(self, node: ast.UnaryOp):
         node.operand = self.visit(node.operand)
-        if isinstance(node.operand, ast.Constant) and type(node.op) in _OPERATORS:
+        if type(node.op) not in _OPERATORS:
+            raise self.refuse(node, f"operator {type(node.op).__name__} is not in the subset")
+        if isinstance(node.operand, ast.Constant):
             return ast.copy_location(ast.Constant(_OPERATORS[type(node.op)](node.operand.value)), node)
         return node
 
     def visit_Compare(self, node: ast.Compare):
         if len(node.ops) != 1:
             raise self.refuse(node, "one comparison at a time")
+        if type(node.ops[0]) not in _OPERATORS:
+            raise self.refuse(node, f"operator {type(node.ops[0]).__name__} is not in the subset")
         node.left, node.comparators = self.visit(node.left), [self.visit(node.comparators[0])]
         (known_l, left), (known_r, right) = constant_of(node.left), constant_of(node.comparators[0])
         if known_l and known_r:
@@ -311,14 +329,17 @@ class Fold(ast.NodeTransformer):
                 return ast.copy_location(ast.Tuple(items, ast.Load()), node)
             total = items[0] if items else ast.Constant(0.0)
             for item in items[1:]:
-                total = ast.BinOp(total, ast.Add(), item)
-            return ast.copy_location(total, node)
+                total = self.combined(ast.copy_location(ast.BinOp(total, ast.Add(), item), node))
+            return total
         node.args = self.expanded(node.args)
         if name in MATH_WORDS or (self.in_kernel and name in KERNEL_WORDS):
             return node
         if name in self.locals:
             raise self.refuse(node, f"{name} is a local value, not a formula")
-        emitted, constant = self.call(name)
+        try:
+            emitted, constant = self.call(name)
+        except KeyError:
+            raise self.refuse(node, f"{name} is not a formula and the scene binds nothing to it") from None
         if constant is not None:
             return copy.deepcopy(constant)
         node.func = ast.Name(emitted, ast.Load())

@@ -1,13 +1,15 @@
 """Loops of the coupling: which cells the solid covers, what they hold, and what the fluid gives to the particles.
 
-A cell is named by its flat index `at` in a field of one variable: block * (cells of a block in memory) + place in the block.
-`shape` is that of a block in memory (Z, Y, X); `lower`, `spacing` the grid's, `origin`, `extent` the blocks'.
+A cell is named by its flat index `at` in a field of one variable: block * (cells in its memory) + place in the block.
+`shape` (Z, Y, X) is that of a block in memory; `lower`, `spacing` are the grid's, `origin`, `extent` the blocks';
+`start` to `strides` are the fields of SearchCells.
 """
 
 from math import floor
 
 from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
+from distfsi.kernels.gather import any_particle, sum_particles
 from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
@@ -16,7 +18,7 @@ from distfsi.physics.tensors import dot
 # What a cell is: fluid; fluid since this step; not yet looked at; behind the wall; farther behind than fluxes look.
 FLUID, FRESH, UNKNOWN, COVERED, DEEP = range(5)
 
-# ---- places -----------------------------------------------------------------------------------------------------------
+# ---- places ---------------------------------------------------------------------------------------------------------
 
 
 @helper
@@ -37,59 +39,7 @@ def center_of(at, shape, lower, spacing, origin):
     return tuple(lower[d] + (origin[block, d] + index[d] + 0.5) * spacing[d] for d in static_range(DIMENSIONS))
 
 
-# ---- sums over particles ------------------------------------------------------------------------------------------------
-
-
-@helper
-def bins_within(x, radius, lower, size, low, window):
-    """First and past-the-end search cell, along one axis of the window, of points within `radius` of x."""
-    first = int(floor((x - radius - lower) / size) - low) + 1
-    last = int(floor((x + radius - lower) / size) - low) + 1
-    return (min(max(first, 0), window), min(max(last + 1, 0), window))
-
-
-@helper
-def any_particle(center, reach, start, lower, size, low, window, strides):
-    """Whether a search cell that a box of half width `reach` touches holds particles."""
-    x = bins_within(center[0], reach[0], lower[0], size, low[0], window[0])
-    y, z = (0, 1), (0, 1)
-    if DIMENSIONS > 1:
-        y = bins_within(center[1], reach[1], lower[1], size, low[1], window[1])
-    if DIMENSIONS > 2:
-        z = bins_within(center[2], reach[2], lower[2], size, low[2], window[2])
-    for k in range(z[0], z[1]):
-        for j in range(y[0], y[1]):
-            row = k * strides[2] + j * strides[1]
-            if start[row + x[0]] < start[row + max(x[0], x[1])]:
-                return True
-    return False
-
-
-@helper
-def sum_particles(sums, x, radius, values, position, start, order, lower, size, low, window, strides):
-    """sums[:] = sum of values[p] W(|x - x_p|) over the particles p closer than `radius`, in the order of the search cells."""
-    for v in range(len(sums)):
-        sums[v] = 0.0
-    bx = bins_within(x[0], radius, lower[0], size, low[0], window[0])
-    by, bz = (0, 1), (0, 1)
-    if DIMENSIONS > 1:
-        by = bins_within(x[1], radius, lower[1], size, low[1], window[1])
-    if DIMENSIONS > 2:
-        bz = bins_within(x[2], radius, lower[2], size, low[2], window[2])
-    for k in range(bz[0], bz[1]):
-        for j in range(by[0], by[1]):
-            row = k * strides[2] + j * strides[1]
-            for n in range(start[row + bx[0]], start[row + bx[1]]):
-                p = order[n]
-                dx = tuple(x[d] - position[p, d] for d in static_range(DIMENSIONS))
-                distance2 = dot(dx, dx)
-                if distance2 < radius * radius:
-                    weight = immersed_weight(distance2, radius)
-                    for v in range(len(sums)):
-                        sums[v] += weight * values[p, v]
-
-
-# ---- regions ------------------------------------------------------------------------------------------------------------
+# ---- regions --------------------------------------------------------------------------------------------------------
 
 
 @driver
@@ -97,7 +47,7 @@ def cover(
     begin, end, kind, occupied, U, lost, radius, volume, position, start, order, lower, size, low, window, strides,
     shape, spacing, origin, extent,
 ):  # fmt: skip
-    """kind = COVERED where the particles' `volume` (n, 1) fills half of the kernel's ball of `radius`, FRESH where it did before.
+    """kind = COVERED where the particles' `volume` (n, 1) fills half of the kernel of `radius`, FRESH where it did.
 
     occupied (blocks,): whether a block has cells that are not FLUID; without those and particles it is skipped.
     lost (blocks, conserved): grows by what the cells that become covered hold per volume.
@@ -175,7 +125,7 @@ def list_cells(begin, end, kind, occupied, shape, extent, first, covered, deep, 
                         f += 1
 
 
-# ---- what the cells hold ------------------------------------------------------------------------------------------------
+# ---- what the cells hold --------------------------------------------------------------------------------------------
 
 
 @driver
@@ -183,7 +133,7 @@ def find_wall_velocity(
     begin, end, covered, velocity, inertia, radius, momentum, position, start, order, lower, size, low, window, strides,
     shape, spacing, origin,
 ):  # fmt: skip
-    """velocity (n, D) of the boundary in the covered cells: the particles' mean by mass and kernel (Eq. 31 with weights).
+    """velocity (n, D) of the wall in covered cells: the particles' mean by mass and kernel (Eq. 31 with weights).
 
     momentum (particles, 1 + D): mass and momentum; inertia (n,) = sum of mass times kernel.
     """
@@ -198,7 +148,7 @@ def find_wall_velocity(
 
 @helper
 def mean_of_fluid(U, kind, at, cells, offsets, weights, rings, rest):
-    """Primitive state: weighted mean over the FLUID cells of the first ring around `at` that has any (Eq. 32), else `rest`."""
+    """Primitive state: mean over the FLUID cells of the first ring around `at` that has any (Eq. 32), else `rest`."""
     share = 0.0
     total = tuple(0.0 for _ in static_range(VARIABLES))
     for ring in range(len(rings) - 1):
@@ -249,12 +199,12 @@ def fill_deep(begin, end, deep, U, shape, rest):
         put(U, deep[n], cells, state)
 
 
-# ---- what the fluid gives -----------------------------------------------------------------------------------------------
+# ---- what the fluid gives -------------------------------------------------------------------------------------------
 
 
 @helper
 def add_flux(passed, n, U, at, cells, step, axis, weight, P, T, F):
-    """passed[n] += weight * flux through the face between the cells `at` and `at + step`, by the rows of the stage itself."""
+    """passed[n] += weight * flux through the face between the cells `at` and `at + step`, by the rows of the stage."""
     first = at + at // cells * (VARIABLES - 1) * cells
     for c in range(4):
         primitives_row(U, P, first + (c - 1) * step, cells, c, 4, 1)
@@ -284,7 +234,7 @@ def collect_wall(begin, end, covered, passed, U, kind, shape, steps, weights):
 
 @driver
 def collect_sides(begin, end, side_cells, side, passed, U, kind, shape, steps, weights):
-    """passed[n] grows by what leaves through the domain's sides, side[n] = 2 axis + (0 low | 1 high), at covered cells."""
+    """passed[n] grows by what leaves through a domain's side, side[n] = 2 axis + (0 low, 1 high), at a covered cell."""
     cells = shape[0] * shape[1] * shape[2]
     P, T, F = workspace(4 * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
     for n in range(begin, end):
@@ -315,54 +265,54 @@ def cells_within(x, radius, lower, spacing, first, end):
     return (max(low, first), min(high + 1, end))
 
 
+@helper
+def home_of(x, lower, spacing, grid_cells, block_cells, curve_index):
+    """Curve index of the block that x is in or, outside, nearest to."""
+    own = tuple(
+        max(min(int(floor((x[d] - lower[d]) / spacing[d])), grid_cells[d] - 1), 0) // block_cells[d]
+        for d in static_range(3)
+    )
+    return curve_index[own[0], own[1], own[2]]
+
+
+@helper
+def sum_cells(x, b, radius, kick, shape, lower, spacing, origin, extent, seen_cells):
+    """Sum of kernel * kick over the cells around x in the memory of block b."""
+    cells = shape[0] * shape[1] * shape[2]
+    first = tuple(max(origin[b, d] - 2, seen_cells[d, 0]) for d in static_range(3))
+    end = tuple(min(origin[b, d] + extent[b, d] + 2, seen_cells[d, 1]) for d in static_range(3))
+    ix, iy, iz = tuple(cells_within(x[d], radius, lower[d], spacing[d], first[d], end[d]) for d in static_range(3))
+    total = tuple(0.0 for _ in static_range(DIMENSIONS))
+    for k in range(iz[0], iz[1]):
+        for j in range(iy[0], iy[1]):
+            for i in range(ix[0], ix[1]):
+                at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
+                given = tuple(load(kick, at + (b * (DIMENSIONS - 1) + d) * cells) for d in static_range(DIMENSIONS))
+                if dot(given, given) > 0.0:
+                    center = center_of(at, shape, lower, spacing, origin)
+                    dx = tuple(center[d] - x[d] for d in static_range(DIMENSIONS))
+                    if dot(dx, dx) < radius * radius:
+                        weight = immersed_weight(dot(dx, dx), radius)
+                        total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))
+    return total
+
+
 @driver
 def push(
-    begin, end, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, open_cells,
+    begin, end, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, seen_cells,
     grid_cells, block_cells, curve_index, first_block,
 ):  # fmt: skip
     """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around a particle; home[p] = its local block.
 
-    open_cells (3, 2): first and past-the-end cell of the grid and of its images at symmetry planes.
+    seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes.
     """
-    cells = shape[0] * shape[1] * shape[2]
     for p in range(begin, end):
-        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        own = tuple(
-            max(min(int(floor((x[d] - lower[d]) / spacing[d])), grid_cells[d] - 1), 0) // block_cells[d]
-            for d in static_range(DIMENSIONS)
+        x = (  # an unused axis has one cell, from 0 to 1
+            position[p, 0],
+            position[p, 1] if DIMENSIONS > 1 else 0.5,
+            position[p, 2] if DIMENSIONS > 2 else 0.5,
         )
-        y_place = own[1] if DIMENSIONS > 1 else 0
-        z_place = own[2] if DIMENSIONS > 2 else 0
-        b = curve_index[own[0], y_place, z_place] - first_block
-        home[p] = b
-        ranges = tuple(
-            cells_within(
-                x[d],
-                radius,
-                lower[d],
-                spacing[d],
-                max(origin[b, d] - 2, open_cells[d, 0]),
-                min(origin[b, d] + extent[b, d] + 2, open_cells[d, 1]),
-            )
-            for d in static_range(DIMENSIONS)
-        )
-        by, bz = (0, 1), (0, 1)
-        if DIMENSIONS > 1:
-            by = ranges[1]
-        if DIMENSIONS > 2:
-            bz = ranges[2]
-        total = tuple(0.0 for _ in static_range(DIMENSIONS))
-        for k in range(bz[0], bz[1]):
-            for j in range(by[0], by[1]):
-                for i in range(ranges[0][0], ranges[0][1]):
-                    at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
-                    first = at + b * (DIMENSIONS - 1) * cells
-                    given = tuple(load(kick, first + d * cells) for d in static_range(DIMENSIONS))
-                    if dot(given, given) > 0.0:
-                        c = center_of(at, shape, lower, spacing, origin)
-                        dx = tuple(c[d] - x[d] for d in static_range(DIMENSIONS))
-                        if dot(dx, dx) < radius * radius:
-                            weight = mass[p] * immersed_weight(dot(dx, dx), radius)
-                            total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))
+        home[p] = home_of(x, lower, spacing, grid_cells, block_cells, curve_index) - first_block
+        total = sum_cells(x, home[p], radius, kick, shape, lower, spacing, origin, extent, seen_cells)
         for d in static_range(DIMENSIONS):
-            impulse[p, d] = total[d]
+            impulse[p, d] = mass[p] * total[d]

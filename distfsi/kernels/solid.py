@@ -9,6 +9,9 @@ from math import floor
 from distfsi.device.markers import driver, helper
 from distfsi.physics.pair import (
     approach_speed,
+    corrected_stress,
+    gradient_correction,
+    mid_step,
     pair_acceleration,
     pair_gradient,
     pair_heating,
@@ -20,11 +23,9 @@ from distfsi.physics.solid_eos import bulk_modulus, solid_pressure, solid_sound_
 from distfsi.physics.strength import plastic_heating, plastic_increment, trial_deviator, von_mises, yield_stress
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
-from distfsi.physics.tensors import dot, trace
+from distfsi.physics.tensors import dot, product, trace
 
-MASS, DENSITY, SMOOTHING, PRESSURE, SOUND_SPEED, VELOCITY = range(
-    6
-)  # columns of `state`; the deviator follows the velocity
+MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
 EOS_CONSTANTS, STRENGTH_CONSTANTS = 9, 11  # columns of the material tables
 
 # ---- neighbour search -----------------------------------------------------------------------------------------------
@@ -70,16 +71,16 @@ def order_cells(begin, end, start, order, key):
 
 
 @driver
-def find_neighbours(begin, end, position, state, cell, start, order, strips, neighbours, neighbour_count):
+def find_neighbours(begin, end, position, state, cell, start, order, rows, neighbours, neighbour_count):
     """neighbours[i] = all particles closer than 2 h_ij, cell by cell in the order of their keys.
 
-    `strips` are the offsets of the rows of three cells around a cell. The count may exceed the table's width; then the
+    `rows` are the offsets of the rows of three cells around a cell. The count may exceed the table's width; then the
     table is not complete.
     """
     for i in range(begin, end):
         found = 0
-        for strip in range(len(strips)):
-            c = cell[i] + strips[strip]
+        for r in range(len(rows)):
+            c = cell[i] + rows[r]
             for n in range(start[c - 1], start[c + 2]):
                 j = order[n]
                 reach = state[i, SMOOTHING] + state[j, SMOOTHING]
@@ -101,9 +102,29 @@ def difference(A, column, i, j):
 
 
 @helper
-def deviator_of(state, i):
-    """Deviatoric stress of a particle."""
-    return tuple(state[i, VELOCITY + DIMENSIONS + c] for c in static_range(COMPONENTS))
+def matrix_of(A, i):
+    """Matrix whose rows lie one after the other in A[i]."""
+    return tuple(tuple(A[i, a * DIMENSIONS + b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+
+
+@helper
+def no_matrix():
+    """Matrix of zeros."""
+    return tuple(tuple(0.0 for _ in static_range(DIMENSIONS)) for _ in static_range(DIMENSIONS))
+
+
+@helper
+def plus(first, second):
+    """Sum of two matrices."""
+    return tuple(tuple(first[a][b] + second[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+
+
+@helper
+def store_matrix(A, i, matrix):
+    """A[i] = rows of the matrix, one after the other."""
+    for a in static_range(DIMENSIONS):
+        for b in static_range(DIMENSIONS):
+            A[i, a * DIMENSIONS + b] = matrix[a][b]
 
 
 @helper
@@ -119,24 +140,33 @@ def pair_geometry(position, state, i, j):
 
 
 @driver
-def accelerate(begin, end, position, state, neighbours, neighbour_count, acceleration, limits):
+def correct(begin, end, position, state, neighbours, neighbour_count, pressure, deviator, correction, stress):
+    """correction[i] = what makes gradients exact for linear fields; stress[i] = the particle's stress times it."""
+    for i in range(begin, end):
+        moment = no_matrix()
+        for n in range(neighbour_count[i]):
+            j = neighbours[i, n]
+            dx = difference(position, 0, i, j)
+            slope = smoothing_slope(dot(dx, dx), 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING]))
+            moment = plus(moment, pair_gradient(dx, dx, slope, state[j, MASS] / state[j, DENSITY]))
+        matrix = gradient_correction(moment)
+        S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
+        store_matrix(correction, i, matrix)
+        store_matrix(stress, i, corrected_stress(S, pressure[i], matrix))
+
+
+@driver
+def accelerate(begin, end, position, state, neighbours, neighbour_count, stress, acceleration, limits):
     """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow."""
     for i in range(begin, end):
         total = tuple(0.0 for _ in static_range(DIMENSIONS))
         fastest = 0.0
-        own = deviator_of(state, i)
+        own = matrix_of(stress, i)
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
             dx, slope, approach, Pi = pair_geometry(position, state, i, j)
-            other = deviator_of(state, j)
-            pull = pair_acceleration(
-                dx,
-                slope,
-                tuple(own[c] + other[c] for c in static_range(COMPONENTS)),
-                state[i, PRESSURE] + state[j, PRESSURE],
-                state[i, DENSITY] * state[j, DENSITY],
-                Pi,
-            )
+            densities = state[i, DENSITY] * state[j, DENSITY]
+            pull = pair_acceleration(dx, slope, plus(own, matrix_of(stress, j)), densities, Pi)
             total = tuple(total[d] + state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
             fastest = max(fastest, approach)
         for d in static_range(DIMENSIONS):
@@ -144,40 +174,29 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, acceler
         limits[i, 0], limits[i, 1] = stable_time(state[i, SMOOTHING], state[i, SOUND_SPEED], fastest, total)
 
 
-# ---- update --------------------------------------------------------------------------------------------------------
+# ---- update ---------------------------------------------------------------------------------------------------------
 
 
 @driver
-def heat(begin, end, position, state, neighbours, neighbour_count, dt, velocity, energy, gradient):
+def heat(begin, end, position, state, neighbours, neighbour_count, dt, stress, correction, velocity, energy, gradient):
     """Advance the energy (Eq. 5c) and find the velocity gradient; `velocity` is the new one, of all particles.
 
     The energy takes the mean of the old and the new velocities, so that kinetic and internal energy exchange exactly.
     """
     for i in range(begin, end):
         power = 0.0
-        total = tuple(tuple(0.0 for _ in static_range(DIMENSIONS)) for _ in static_range(DIMENSIONS))
-        own = deviator_of(state, i)
+        total = no_matrix()
+        own = matrix_of(stress, i)
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
             dx, slope, approach, Pi = pair_geometry(position, state, i, j)
             before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
-            power += state[j, MASS] * pair_heating(
-                tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS)),
-                dx,
-                slope,
-                own,
-                state[i, PRESSURE] + state[j, PRESSURE],
-                state[i, DENSITY] * state[j, DENSITY],
-                Pi,
-            )
-            part = pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY])
-            total = tuple(
-                tuple(total[a][b] + part[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
-            )
+            mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
+            densities = state[i, DENSITY] * state[j, DENSITY]
+            power += state[j, MASS] * pair_heating(mean, dx, slope, own, densities, Pi)
+            total = plus(total, pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY]))
         energy[i] += dt * power
-        for a in static_range(DIMENSIONS):
-            for b in static_range(DIMENSIONS):
-                gradient[i, a * DIMENSIONS + b] = total[a][b]
+        store_matrix(gradient, i, mid_step(product(total, matrix_of(correction, i)), dt))
 
 
 @driver
@@ -189,9 +208,7 @@ def deform(
     `eos` and `strength` hold one row of constants per body.
     """
     for i in range(begin, end):
-        rates = tuple(
-            tuple(gradient[i, a * DIMENSIONS + b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
-        )
+        rates = matrix_of(gradient, i)
         law = tuple(eos[body[i], k] for k in static_range(EOS_CONSTANTS))
         metal = tuple(strength[body[i], k] for k in static_range(STRENGTH_CONSTANTS))
         density[i], h[i] = dilated(density[i], h[i], trace(rates), dt)

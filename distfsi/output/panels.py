@@ -46,6 +46,8 @@ def draw_profiles(figure: FigureBase, frames: Sequence[Frame]) -> None:
             for x, values, style in some:
                 axes.plot(x / length, values / size, style, color=color, markersize=3, label=label)
                 label = None
+        if name in MAPS:
+            axes.set_yscale(_norm([values for some in curves for _, values, _ in some]).__class__ is LogNorm and "log" or "linear")
         axes.set_ylabel(_label(name, unit))
         axes.grid(alpha=0.3)
     rows[0].legend(loc="best")
@@ -156,10 +158,10 @@ def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
     for axes, (title, curves) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
         for name, values in curves.items():
             axes.plot(history["time [s]"] / size, values, label=re.sub(r" \[.*", "", name))
-        axes.set(xlabel=f"time [{unit}]", title=title)
+        axes.set(xlabel=f"time [{unit}]", ylabel=title)
         axes.grid(alpha=0.3)
         if len(curves) > 1:
-            axes.legend(fontsize="small")
+            axes.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.06), ncols=2)
 
 
 def _unit_of(column: str) -> str:

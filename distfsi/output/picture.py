@@ -20,8 +20,16 @@ from distfsi.output.panels import draw_history, draw_maps, draw_profiles, map_na
 
 TIMES = 4
 UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps stand side by side
-HISTORY_HEIGHT = 3.2  # inches
-STYLE = {"font.size": 10, "axes.titlesize": 10, "axes.formatter.limits": (-3, 4), "axes.formatter.use_mathtext": True}
+HISTORY_HEIGHT = 3.8  # inches
+STYLE = {
+    "font.size": 10,
+    "axes.titlesize": 10,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
+    "figure.constrained_layout.w_pad": 0.1,
+    "figure.constrained_layout.h_pad": 0.08,
+}
 
 
 def draw_summary(directory: Path) -> Path:
@@ -39,7 +47,7 @@ def draw_summary(directory: Path) -> Path:
         rows.append((lambda figure: draw_history(figure, columns), HISTORY_HEIGHT))
     with matplotlib.rc_context(STYLE):
         heights = [height for _, height in rows]
-        figure = Figure(figsize=(width, sum(heights)), layout="constrained")
+        figure = Figure(figsize=(width, sum(heights)), layout="compressed")
         parts = np.atleast_1d(figure.subfigures(len(rows), 1, height_ratios=heights))
         for (draw, _), part in zip(rows, parts, strict=True):
             draw(part)
@@ -59,6 +67,6 @@ def _fields(frames: list[Frame]) -> tuple[Callable[[FigureBase], None], float, f
     upright = aspect > UPRIGHT_ASPECT
     fields, times = len(map_names(first)), len(frames)
     rows, columns = (fields, times) if upright else (times, fields)
-    panel = min(6.0, 12.0 / columns, 7.0 / aspect)
+    panel = min(6.0, 12.0 / columns, 5.0 / aspect)
     width = max(10.0, columns * panel + 1.5)
     return lambda figure: draw_maps(figure, frames, upright), width, rows * (panel * aspect + 0.5) + 1.2

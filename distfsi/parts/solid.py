@@ -25,6 +25,7 @@ DRIVERS = (
     kernels.fill_cells,
     kernels.order_cells,
     kernels.find_neighbours,
+    kernels.correct,
     kernels.accelerate,
     kernels.heat,
     kernels.deform,
@@ -51,10 +52,10 @@ class Solid:
         self.exchange = ParticleExchange(blocks)
         axes = range(self.dimensions)
         self._vector = tuple((a,) for a in axes)
-        self._tensor = (*((a, a) for a in axes), *((a, b) for a in axes for b in axes if a < b))
+        self._matrix = tuple((a, b) for a in axes for b in axes)
         constants = {
             "DIMENSIONS": self.dimensions,
-            "COMPONENTS": len(self._tensor),
+            "COMPONENTS": self.dimensions * (self.dimensions + 1) // 2,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
         }
@@ -78,7 +79,7 @@ class Solid:
         c = {name: column[mine] for name, column in columns.items()}
         n = len(mine)
         c |= {name: np.zeros(n) for name in ("energy", "plastic_strain", "pressure", "sound_speed")}
-        c["deviator"] = np.zeros((n, len(self._tensor)))
+        c["deviator"] = np.zeros((n, self.dimensions * (self.dimensions + 1) // 2))
         c["temperature"] = self.strength[c["body"], ROOM_COLUMN]
         self.columns = c
         self._find_blocks()
@@ -111,16 +112,19 @@ class Solid:
         support = 2.0 * self.communicator.maximum(np.array([c["h"].max(initial=0.0)]))[0]
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
-        state = [c[name] for name in ("mass", "density", "h", "pressure", "sound_speed", "velocity", "deviator")]
-        parity = ((),) * kernels.VELOCITY + self._vector + self._tensor
+        state = [c[name] for name in ("mass", "density", "h", "sound_speed", "velocity")]
+        parity = ((),) * kernels.VELOCITY + self._vector
         self._plan = self.exchange.ghosts(c["position"], c["id"], max(reach, support))
         self._position, self._state = self._plan.exchange(
             [(c["position"], "position"), (np.column_stack(state), parity)]
         )
         own = self._plan.own
         self.neighbours.find(own, self._position, self._state, self._plan.key, support)
+        self._correction, stress = np.empty((2, own, self.dimensions**2))
+        self._run(self.kernels.correct, *self._pairs, c["pressure"], c["deviator"], self._correction, stress)
+        (self._stress,) = self._plan.exchange([(stress, self._matrix)])
         self._acceleration, self._limits = np.empty((own, self.dimensions)), np.empty((own, len(LIMITS)))
-        self._run(self.kernels.accelerate, *self._pairs, self._acceleration, self._limits)
+        self._run(self.kernels.accelerate, *self._pairs, self._stress, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
         """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare()."""
@@ -148,7 +152,7 @@ class Solid:
 
         (around,) = self._plan.exchange([(velocity, self._vector)])
         gradient = np.empty((self._plan.own, self.dimensions**2))
-        self._run(self.kernels.heat, *self._pairs, dt, around, c["energy"], gradient)
+        self._run(self.kernels.heat, *self._pairs, dt, self._stress, self._correction, around, c["energy"], gradient)
         self._deform(dt, gradient)
         c["velocity"] = velocity
         c["position"] = c["position"] + dt * velocity

@@ -66,9 +66,10 @@ def face_flux(left, right):
 
 
 def updated(U_n, U, W, D, b, dt):
-    """U_n + b (U - D + dt S - U_n): one stage of SSP-RK3 (paper, Eq. 16), written so that a uniform state stays as it is to the bit.
+    """U_n + b (U - D + dt S - U_n): one stage of SSP-RK3 (paper, Eq. 16).
 
-    D is dt times the flux divergence, S the body force and its work.
+    D is dt times the flux divergence, S the body force and its work. Written so that a uniform state stays as it is to
+    the bit.
     """
     rho = U[0]
     work = sum(GRAVITY[d] * U[1 + d] for d in static_range(DIMENSIONS))

@@ -1,4 +1,4 @@
-"""The immersed boundary: weights between cells and particles, and what a cell behind the wall holds (paper, Sec. 3.2)."""
+"""The immersed boundary: weights between cells and particles, what a cell behind the wall holds (paper, Sec. 3.2)."""
 
 from distfsi.physics.smoothing import smoothing_kernel
 from distfsi.physics.subset import static_range
@@ -20,7 +20,9 @@ def moving_with(W, velocity):
 
 
 def impulse_on_wall(passed, velocity):
-    """Impulse [N s] on the solid in a cell moving with `velocity` [m/s] into which the amounts `passed` (masses, momentum
-    and energy) have crossed the wall (Eq. 33, corrected: only faces towards the fluid count)."""
+    """Impulse [N s] on the solid in a cell that moves with `velocity` [m/s] (Eq. 33; only faces to fluid count).
+
+    passed: the amounts (masses, momentum, energy) that have crossed these faces into the cell.
+    """
     mass = sum(passed[v] for v in static_range(PHASES))
     return tuple(passed[PHASES + d] - velocity[d] * mass for d in static_range(DIMENSIONS))

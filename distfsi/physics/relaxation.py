@@ -1,14 +1,15 @@
 """Instantaneous pressure relaxation of the six-equation model (paper, Eq. 28 corrected).
 
-Each phase keeps e - e0 + p (1/rho - 1/rho0) = 0 while its volume fraction moves until both pressures agree. For a Mie-Grueneisen phase
-with constant omega this path is explicit in the growth t = a/a0 - 1 of its volume (G: reference pressure):
+Each phase keeps e - e0 + p (1/rho - 1/rho0) = 0 while its volume fraction moves until both pressures agree. For a
+Mie-Grueneisen phase with constant omega this path is explicit in the growth t = a/a0 - 1 of its volume (G: reference
+pressure):
 
     p(t) - p0 = ((G - G0)(1 + t) - ((p0 - G0) + omega p0) t) / (1 + (1 + omega) t).
 
-With constant G (ideal and stiffened gas) it is the hyperbola a = a0 + k (p0 - p)/(p + P), k = a0/(1 + omega), and the common pressure
-the root of a quadratic. Otherwise the hyperbola of the stiffened gas with the same bulk modulus, rho c^2 = (1 + omega)(p + P), is fitted
-where both phases stand, and solved again, a fixed number of times. Pressures are relative to the pressure before the step, so that nothing moves, to the bit,
-when nothing changed.
+With constant G (ideal and stiffened gas) it is the hyperbola a = a0 + k (p0 - p)/(p + P), k = a0/(1 + omega), and the
+common pressure is the root of a quadratic. Otherwise the hyperbola of the stiffened gas with the same bulk modulus,
+rho c^2 = (1 + omega)(p + P), is fitted where both phases stand and solved again, a fixed number of times. Pressures are
+relative to the pressure before the step, so that nothing moves, to the bit, when nothing changed.
 """
 
 from math import sqrt
@@ -16,7 +17,7 @@ from math import sqrt
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import CLOSED_FORM, MINIMUM_FRACTION, OMEGA_1, OMEGA_2, reference_1, reference_2
 
-REFITS = 3  # with JWL both pressures agree to 1e-6 after imbalances up to a factor 2, to 1e-3 after a factor 10
+REFITS = 3  # with JWL both pressures agree to 1e-6 after imbalances up to a factor 2, to 1e-2 after a factor 10
 DEEPEST = -0.9  # a phase pressure may fall by this part of p + P in one stage; the total energy is not touched
 NEAREST = 1.000001  # to the volume at which a phase's pressure has no bound
 
@@ -40,7 +41,10 @@ def change_on_path(t, p0, G0, reference, OMEGA):
 
 
 def relaxed_fraction_change(p_n, a1, da, m1, m2, G1_n, G2_n, we1, we2):
-    """Change of a1 by relaxation, after transport has changed a1 by `da` and omega_k times the phase energies by we1, we2."""
+    """Change of a1 by relaxation, after transport changed a1 by `da`, and omega_k times the phase energies by we1, we2.
+
+    Both phases had the pressure p_n and the reference pressures G_n before.
+    """
     a2 = 1.0 - a1
     share1, share2 = 1.0 / (1.0 + OMEGA_1), 1.0 / (1.0 + OMEGA_2)
     rho1, rho2 = m1 / a1, m2 / a2

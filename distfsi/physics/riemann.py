@@ -4,7 +4,7 @@ from math import sqrt
 
 
 def einfeldt_speeds(rho_l, u_l, c_l, rho_r, u_r, c_r):
-    """Slowest and fastest wave, bounding strong shocks (Einfeldt, SIAM J. Numer. Anal. 25, 1988; the paper's Eq. 20 does not)."""
+    """Slowest and fastest wave (Einfeldt, SIAM J. Numer. Anal. 25, 1988): bound strong shocks too, unlike Eq. 20."""
     root_l = sqrt(rho_l)
     root_r = sqrt(rho_r)
     share_l = root_l / (root_l + root_r)

@@ -35,6 +35,58 @@ def trace(matrix):
     return sum(matrix[a][a] for a in static_range(DIMENSIONS))
 
 
+def identity_plus(factor, matrix):
+    """Unit matrix plus `factor` times a matrix."""
+    return tuple(
+        tuple((1.0 if a == b else 0.0) + factor * matrix[a][b] for b in static_range(DIMENSIONS))
+        for a in static_range(DIMENSIONS)
+    )
+
+
+def determinant(m):
+    """Determinant of a matrix."""
+    if DIMENSIONS == 1:
+        return m[0][0]
+    if DIMENSIONS == 2:
+        return m[0][0] * m[1][1] - m[0][1] * m[1][0]
+    if DIMENSIONS == 3:
+        return sum(
+            m[0][a] * (m[1][(a + 1) % 3] * m[2][(a + 2) % 3] - m[1][(a + 2) % 3] * m[2][(a + 1) % 3])
+            for a in static_range(3)
+        )
+
+
+def least_eigenvalue(m):
+    """Lower bound of the eigenvalues of a symmetric positive matrix, tight if the others are equal; NaN for zero."""
+    if DIMENSIONS == 1:
+        return m[0][0]
+    if DIMENSIONS == 2:
+        return determinant(m) / trace(m)
+    if DIMENSIONS == 3:
+        return 4.0 * determinant(m) / (trace(m) * trace(m))
+
+
+def inverse(m):
+    """Inverse of a matrix."""
+    scale = 1.0 / determinant(m)
+    if DIMENSIONS == 1:
+        return ((scale,),)
+    if DIMENSIONS == 2:
+        return ((scale * m[1][1], -scale * m[0][1]), (-scale * m[1][0], scale * m[0][0]))
+    if DIMENSIONS == 3:
+        return tuple(
+            tuple(
+                scale
+                * (
+                    m[(b + 1) % 3][(a + 1) % 3] * m[(b + 2) % 3][(a + 2) % 3]
+                    - m[(b + 1) % 3][(a + 2) % 3] * m[(b + 2) % 3][(a + 1) % 3]
+                )
+                for b in static_range(3)
+            )
+            for a in static_range(3)
+        )
+
+
 def rows(tensor):
     """The matrix of a symmetric tensor."""
     if DIMENSIONS == 1:

@@ -1,8 +1,8 @@
 """The six-equation model of two compressible materials with one velocity and, after relaxation, one pressure.
 
-Stored state U = (a1 rho1, a2 rho2, rho u (DIMENSIONS), rho E, a1); primitive state W = (rho1, rho2, u (DIMENSIONS), p, a1).
-Phase energies live inside a stage and are reset from rho E (Saurel, Petitpas, Berry, J. Comput. Phys. 228, 2009; paper, Eqs. 9-30).
-At faces the velocity components are rotated so that the normal one comes first.
+Stored state U = (a1 rho1, a2 rho2, rho u (DIMENSIONS), rho E, a1); primitive state W = (rho1, rho2, u (DIMENSIONS), p,
+a1). Phase energies live inside a stage and are reset from rho E (Saurel, Petitpas, Berry, J. Comput. Phys. 228, 2009;
+paper, Eqs. 9-30). At faces the velocity components are rotated so that the normal one comes first.
 """
 
 from math import sqrt
@@ -71,7 +71,7 @@ def sound_speed(W):
 
 
 def energy_behind_wave(rho, p, chi, reference, reference_behind, OMEGA):
-    """rho e of one phase behind a wave that compresses it by chi: the phase's own Hugoniot (replaces the paper's Eq. 27).
+    """rho e of one phase behind a wave that compresses it by chi: the phase's own Hugoniot (in place of Eq. 27).
 
     The pressure grows without bound at the limiting compression; beyond 0.9 of it the denominator is held.
     """
@@ -121,10 +121,11 @@ def face_flux(left, right):
 
 
 def updated(U_n, U, W, D, b, dt):
-    """One stage of SSP-RK3 with pressure relaxation: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure.
+    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure.
 
-    D is dt times the divergence of the fluxes. Everything is written as a change of U_n, so that a uniform state stays as it is to the
-    bit. Phase energies obey the paper's Eq. 15 (sign corrected); rho E is the conserved energy, from which they are reset (Eq. 30).
+    D is dt times the divergence of the fluxes. Everything is written as a change of U_n, so that a uniform state stays
+    as it is to the bit. Phase energies obey the paper's Eq. 15 (sign corrected); rho E is the conserved energy, from
+    which they are reset (Eq. 30).
     """
     W_n = primitives(U_n)
     p_n, a1_n = W_n[2 + DIMENSIONS], U_n[3 + DIMENSIONS]

@@ -1,0 +1,30 @@
+"""Fluids that several test modules use."""
+
+from types import SimpleNamespace
+
+from distfsi.model import FluidModel, fluid_model
+from distfsi.scene.description import Fluid, FluidEos, IdealGas, Jwl, Phase, StiffenedGas
+
+AIR = IdealGas(1.4)
+HELIUM = IdealGas(1.667)
+WATER = StiffenedGas(4.4, 6e8)
+TNT = Jwl(rho0=1630.0, A=3.712e11, B=3.231e9, R1=4.15, R2=0.95, omega=0.3)
+
+MATERIALS = {"air": AIR, "helium": HELIUM, "water": WATER, "tnt": TNT}
+PAIRS = tuple((a, b) for a in ("air", "water", "tnt") for b in ("helium", "water", "tnt"))
+TRACE = 1e-6
+
+
+def model_of(*names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod") -> FluidModel:
+    """The model of a fluid made of `MATERIALS`."""
+    phases = tuple(Phase(name, MATERIALS[name]) for name in names)
+    fluid = Fluid(phases, (), limiter, TRACE, (), "float64")
+    domain = SimpleNamespace(dimensions=dimensions)
+    return fluid_model(SimpleNamespace(fluid=fluid, domain=domain, gravity=gravity or (0.0,) * dimensions))
+
+
+def cold_pressure(eos: FluidEos, density: float) -> float:
+    """Pressure without heat; admissible states lie above it."""
+    from distfsi.scene.thermodynamics import cold_curve
+
+    return cold_curve(eos, density)[0]

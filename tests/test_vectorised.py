@@ -1,0 +1,78 @@
+"""Every row pass of the fluid must come out as packed arithmetic: read from the machine code, not from a clock."""
+
+import inspect
+import platform
+import re
+
+import numpy as np
+import pytest
+from llvmlite.binding import get_host_cpu_features
+
+from distfsi.device import emit, runtime
+from distfsi.kernels import fluid
+from fluids import model_of
+
+pytestmark = pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"
+)
+
+ROWS = (fluid.primitives_row, fluid.slopes_row, fluid.flux_row, fluid.update_row, fluid.signal_row)
+REALS = ("cx", "cy", "cz", "b", "dt", "rx", "ry", "rz")
+SCENES = {
+    "water-air-2D": (("water", "air"), 2, "float64"),
+    "products-air-3D": (("tnt", "air"), 3, "float64"),
+    "air-3D": (("air",), 3, "float64"),
+    "products-air-2D-single": (("tnt", "air"), 2, "float32"),
+}
+WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
+
+
+def module_text(row, scene):
+    names, dimensions, real = SCENES[scene]
+    model = model_of(*names, dimensions=dimensions, limiter="van_leer")
+    return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
+
+
+def machine_code(row, text, real):
+    """What the module's row becomes when called with arrays (upper-case names), reals and integers."""
+    module = {}
+    exec(text, module)
+    arguments = [
+        np.zeros(1, real) if name.isupper() or name.startswith("U_") else np.dtype(real).type(0) if name in REALS else 0
+        for name in inspect.signature(row).parameters
+    ]
+    module[row.__name__](*arguments)  # of no cells
+    return "\n".join(module[row.__name__].inspect_asm().values())
+
+
+def count(code, operations, kind, registers):
+    """Instructions such as vmulpd (kind "pd") on the given registers."""
+    lines = re.findall(rf"^\s+v?(?:{operations}){kind}\b.*$", code, re.MULTILINE)
+    return sum(any(f"%{register}" in line for register in registers) for line in lines)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.__name__)
+def test_rows_are_packed(row, scene):
+    """Each loop has a packed body without any scalar arithmetic; scalar is only the remainder."""
+    names, dimensions, real = SCENES[scene]
+    own, other = ("d", "s") if real == "float64" else ("s", "d")
+    code = machine_code(row, module_text(row, scene), real)
+    bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
+    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.slopes_row else 1
+    assert len(bodies) >= loops
+    assert sum(count(body, "mul|div|sqrt", "s" + own, ["xmm"]) for body in bodies) == 0
+    for operation in ("mul", "div", "sqrt"):
+        scalar, packed = count(code, operation, "s" + own, ["xmm"]), count(code, operation, "p" + own, WIDE)
+        assert bool(packed) == bool(scalar), operation
+    assert count(code, "mul|add|sub|div|sqrt", "[ps]" + other, ["xmm", *WIDE]) == 0
+
+
+@pytest.mark.parametrize("row", [fluid.flux_row, fluid.update_row], ids=lambda row: row.__name__)
+def test_without_the_promise_of_no_alias_rows_are_scalar(row):
+    """So that the test above does fail on the day the compile option is no longer heard."""
+    text = module_text(row, "water-air-2D")
+    plain_row = "from numba import njit\nrow = njit(error_model='numpy')\n"
+    code = machine_code(row, text.replace("real = np.float64\n", "real = np.float64\n" + plain_row, 1), "float64")
+    assert count(code, "mul", "sd", ["xmm"]) > 10
+    assert count(code, "mul", "pd", WIDE) == 0
