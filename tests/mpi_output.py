@@ -1,4 +1,4 @@
-"""Run under mpiexec by test_output.py: every rank writes its part of known fields. Argument: the directory to write to."""
+"""Run under mpiexec by test_output.py: every rank writes its part of known fields into the directory given."""
 
 import sys
 from pathlib import Path

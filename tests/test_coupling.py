@@ -4,85 +4,51 @@ import math
 
 import numpy as np
 import pytest
-from mpi_coupling import AIR_AND_WATER, Coupled, body, gas
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas
 from scipy.ndimage import label
 
 from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from launch import run_ranks
 
-
-def cell_centers(coupled):
-    """Coordinates x, y (ny, nx) of a two-dimensional grid."""
-    grid = coupled.blocks.grid
-    x, y = (grid.lower[a] + (np.arange(grid.cells[a]) + 0.5) * grid.spacing[a] for a in (0, 1))
-    return np.meshgrid(x, y)
-
-
-# ---- covered cells ----------------------------------------------------------------------------------------------------
+# ---- covered cells --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("dimensions", "spacing"), [(1, 0.02), (2, 0.02), (2, 0.03), (3, 0.02)])
 def test_a_box_covers_the_cells_whose_centers_it_holds(dimensions, spacing):
-    cells, h = (20,) * dimensions, 0.04
-    aside = (0.12,) * (dimensions - 1), (0.48,) * (dimensions - 1)
-    box = Box((0.13, *aside[0]), (0.42, *aside[1]))
-    coupled = Coupled(
-        [body(box, spacing, 1.0, (0,) * dimensions)],
-        [(gas(1.0, 1.0, (0,) * dimensions), None)],
-        (0.0,) * dimensions,
-        tuple(h * n for n in cells),
-        cells,
-    )
-    x = (np.arange(20) + 0.5) * h
-    inside = (x > 0.13) & (x < 0.42)
-    along = (x > 0.12) & (x < 0.48)
-    covered = coupled.covered
-    middle = tuple(10 if axis < dimensions else 0 for axis in (2, 1))
-    assert np.array_equal(covered[middle], inside)
-    if dimensions > 1:
-        assert np.array_equal(covered[middle[0], :, 6], along)
+    D, low, high = dimensions, (0.13, 0.12, 0.12), (0.42, 0.48, 0.48)
+    box = body(Box(low[:D], high[:D]), spacing, 1.0, (0,) * D)
+    coupled = Coupled([box], [(gas(1.0, 1.0, (0,) * D), None)], (0.0,) * D, (0.8,) * D, (20,) * D)
+    x = (np.arange(20) + 0.5) * 0.04
+    covered = coupled.covered[7 if D > 2 else 0]
+    assert np.array_equal(covered[7 if D > 1 else 0], (x > low[0]) & (x < high[0]))
+    if D > 1:
+        assert np.array_equal(covered[:, 7], (x > low[1]) & (x < high[1]))
 
 
-def test_a_stretched_ring_stays_closed():
-    """A tube wall eight cells thick, twice as wide: hoops of particles 1.75 times as far apart, as thick as its area allows."""
-    h, inner, stretch = 0.5, 30.0, 1.75
-    ring = body(Tube((0.0, 0.0), inner, inner + 4.0), 0.5 * h, 1.0, (0, 0))
-    coupled = Coupled([ring], [(gas(1.0, 1.0, (0, 0)), None)], (-64.0, -64.0), (64.0, 64.0), (256, 256), block=64)
+@pytest.mark.parametrize(("thickness", "stretch"), [(4.0, 1.75), (1.5, 2.0)])
+def test_a_stretched_ring_stays_closed(thickness, stretch):
+    """Hoops of particles farther apart, in a wall as thin as its area makes it: from 8 cells to 4.6, from 3 to 1.5."""
+    inner = 10.0
+    ring = body(Tube((0.0, 0.0), inner, inner + thickness), 0.25, 1.0, (0, 0))
+    coupled = Coupled([ring], [(gas(1.0, 1.0, (0, 0)), None)], (-24.0, -24.0), (24.0, 24.0), (96, 96), block=32)
     c = coupled.solid.columns
-    r2 = (c["position"] ** 2).sum(axis=1)
-    wider = np.sqrt(1.0 + (stretch**2 - 1.0) * inner**2 / r2)
-    c["position"] *= wider[:, None]
+    grown = (stretch**2 - 1.0) * inner**2
+    c["position"] *= np.sqrt(1.0 + grown / (c["position"] ** 2).sum(axis=1))[:, None]
     coupled.solid.migrate()
     coupled.solid.prepare(coupled.coupling.reach)
     coupled.coupling.classify()
     covered = coupled.covered[0]
-    regions, count = label(~covered)
-    assert count == 2
-    r = np.hypot(*cell_centers(coupled))
-    outer = math.sqrt((inner + 4.0) ** 2 + (stretch**2 - 1.0) * inner**2)
-    inside = (r > stretch * inner) & (r < outer)
-    assert np.all(np.abs(r[covered != inside] - stretch * inner) < 0.5 * h) or covered[inside].mean() > 0.9
+    assert label(~covered)[1] == 2
+    x = (np.arange(96) + 0.5) * 0.5 - 24.0
+    r = np.hypot(*np.meshgrid(x, x))
+    inside = (r > stretch * inner) & (r < math.sqrt((inner + thickness) ** 2 + grown))
     assert covered.sum() == pytest.approx(inside.sum(), rel=0.02)
 
 
-def test_a_thin_stretched_ring_stays_closed():
-    """Three cells thick, stretched until it is 1.5 cells thick."""
-    ring = body(Tube((0.0, 0.0), 10.0, 11.5), 0.25, 1.0, (0, 0))
-    coupled = Coupled([ring], [(gas(1.0, 1.0, (0, 0)), None)], (-24.0, -24.0), (24.0, 24.0), (96, 96), block=32)
-    c = coupled.solid.columns
-    r2 = (c["position"] ** 2).sum(axis=1)
-    c["position"] *= np.sqrt(1.0 + (2.0**2 - 1.0) * 10.0**2 / r2)[:, None]
-    coupled.solid.migrate()
-    coupled.solid.prepare(coupled.coupling.reach)
-    coupled.coupling.classify()
-    assert label(~coupled.covered[0])[1] == 2
+# ---- forces ---------------------------------------------------------------------------------------------------------
 
 
-# ---- forces -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("phases", [AIR_AND_WATER[:1], AIR_AND_WATER])
-@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize(("phases", "precision"), [(AIR, "float64"), (AIR, "float32"), (AIR_AND_WATER, "float64")])
 def test_gas_at_rest_around_a_clamped_body_stays_at_rest(phases, precision):
     everywhere = HalfSpace((2.0, 0.0), (1.0, 0.0))
     disc = body(Ball((0.47, 0.52), 0.21), 0.02, 3.0, (0, 0), everywhere)
@@ -97,7 +63,6 @@ def test_gas_at_rest_around_a_clamped_body_stays_at_rest(phases, precision):
     assert np.abs(velocity).max() < accuracy
     assert np.abs(U[0] / U[0, 0] - 1.0).max() < accuracy
     assert np.abs(impulse).max() < accuracy * dt * 1.7
-    assert 0.5 * coupled.coupling.ledger()["wall"][0] < accuracy
 
 
 def shock(mach):
@@ -129,7 +94,7 @@ def test_a_shock_pushes_a_wall_with_its_reflected_pressure(dimensions):
         (("outflow", "wall"), *(("wall", "wall"),) * (dimensions - 1)),
     )
     before, time = coupled.balance(), 0.0
-    while time < 0.2 / speed + 0.08:
+    while time < 0.2 / speed + 0.15:
         dt, impulse = coupled.step()
         time += dt
     force = impulse / dt / math.prod(upper[1:])
@@ -163,26 +128,21 @@ def test_a_heavy_piston_makes_the_pressure_of_its_speed(speed):
     assert p.mean() == pytest.approx(exact, rel=accuracy)
 
 
-# ---- books ------------------------------------------------------------------------------------------------------------
+# ---- books ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("dimensions", [1, 2, 3])
-@pytest.mark.parametrize("phases", [AIR_AND_WATER[:1], AIR_AND_WATER])
+@pytest.mark.parametrize(("dimensions", "phases"), [(1, AIR), (2, AIR), (2, AIR_AND_WATER), (3, AIR)])
 def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
-    h, cells = 0.05, (24, 16, 16)[:dimensions]
-    aside, other = (0.4,) * (dimensions - 1), len(phases) - 1
-    ball = body(Ball((0.5, *aside), 0.2), 0.025, 3.0, (0.7, 0.3, -0.2)[:dimensions])
-    still, hot = gas(1.0, 1.0, (0,) * dimensions), gas(2.0, 5.0, (0,) * dimensions, other)
-    coupled = Coupled(
-        [ball], [(still, None), (hot, Box((0.0,) * dimensions, (0.2,) * dimensions))], (0.0,) * dimensions,
-        tuple(h * n for n in cells), cells, phases=phases,
-    )  # fmt: skip
-    before, scale = coupled.balance(), np.abs(coupled.balance()).max()
-    for _ in range(40 if dimensions < 3 else 15):
+    D, cells = dimensions, (24, 16, 16)[:dimensions]
+    ball = body(Ball((0.51, 0.41, 0.41)[:D], 0.2), 0.025, 3.0, (0.7, 0.3, -0.2)[:D])
+    still, hot = gas(1.0, 1.0, (0,) * D), gas(2.0, 5.0, (0,) * D, len(phases) - 1)
+    regions = [(still, None), (hot, Box((0.0,) * D, (0.2,) * D))]
+    coupled = Coupled([ball], regions, (0.0,) * D, tuple(0.05 * n for n in cells), cells, phases=phases)
+    before = coupled.balance()
+    for _ in range(40):
         coupled.step()
     ledger = coupled.coupling.ledger()
-    assert np.abs(coupled.balance() - before).max() < 1e-12 * scale
-    assert set(ledger) == set(coupled.coupling.causes)
+    assert np.abs(coupled.balance() - before).max() < 1e-12 * before.max()
     assert ledger["covered"][-1] < 0.0 < ledger["fresh"][-1]
 
 
@@ -226,7 +186,7 @@ def test_a_void_that_opens_inside_the_solid_holds_gas_at_rest():
     assert np.abs(coupled.balance() - before).max() < 1e-13
 
 
-# ---- ranks ------------------------------------------------------------------------------------------------------------
+# ---- ranks ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

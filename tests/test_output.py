@@ -1,4 +1,4 @@
-"""Files of a run: fields from 1, 2 and 4 ranks as VTK and the own readers see them; history, schedule, progress, picture."""
+"""Fields written by 1, 2 and 4 ranks as VTK and the own readers see them; history, schedule, progress, picture."""
 
 import json
 import sys
@@ -9,12 +9,18 @@ import h5py
 import mpi_output
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.image import AxesImage
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
+from distfsi.output.frames import load_frames
 from distfsi.output.history import History, read_history
+from distfsi.output.panels import scaled
+from distfsi.output.picture import Figure, draw_summary
 from distfsi.output.schedule import Every
 
 SCRIPT = Path(__file__).with_name("mpi_output.py")
@@ -327,3 +333,102 @@ def test_times_have_a_fitting_unit(seconds, text):
 @pytest.mark.parametrize(("seconds", "text"), [(12.4, "12 s"), (95.0, "1 min 35 s"), (4000.0, "1 h 06 min")])
 def test_durations(seconds, text):
     assert progress.format_duration(seconds) == text
+
+
+# ---- picture ---------------------------------------------------------------------------------------------------------
+
+COLUMNS = (
+    "time [s]",
+    "time step [s]",
+    "limited by",
+    "fluid energy [J]",
+    "solid kinetic energy [J]",
+    "drift energy [J]",
+)
+
+
+def finish_run(directory):
+    """Put a history next to the field files."""
+    history = History(directory / "history.csv", COLUMNS, OneRank())
+    for step in range(3):
+        history.append(
+            dict(zip(COLUMNS, (1e-6 * step, 1e-6 * min(step, 1), "sound", 9.0 - step, step, 0.0), strict=True))
+        )
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """The figures saved by the test."""
+    saved = []
+    save = Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, *args, **kw: (saved.append(figure), save(figure, *args, **kw))
+    )
+    return saved
+
+
+def assert_nothing_overlaps(figure):
+    """All that belongs to a panel, its labels included, is on the sheet and apart from the other panels."""
+    boxes = [axes.get_tightbbox() for axes in figure.findobj(Axes)]
+    sheet = figure.bbox
+    for i, box in enumerate(boxes):
+        assert sheet.x0 <= box.x0 < box.x1 <= sheet.x1 and sheet.y0 <= box.y0 < box.y1 <= sheet.y1
+        for other in boxes[:i]:
+            assert min(box.x1, other.x1) <= max(box.x0, other.x0) or min(box.y1, other.y1) <= max(box.y0, other.y0)
+
+
+@pytest.mark.parametrize("scene", [*mpi_output.SCENES, "few_particles"])
+def test_a_picture_has_no_overlapping_labels(runs, figures, scene):
+    finish_run(runs[2] / scene)
+    assert draw_summary(runs[2] / scene).read_bytes().startswith(b"\x89PNG")
+    assert_nothing_overlaps(figures[0])
+
+
+def write_bar(directory, blocks, dimensions, fluid):
+    """Field files of five times of a bar of 20 x 4 particles (or 20 in one dimension), with a blast beside it."""
+    writer = FieldWriter(directory, blocks, OneRank())
+    y, x = np.mgrid[: 4 if dimensions == 2 else 1, :20] * 0.1
+    position = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3)
+    for number in range(5):
+        pressure = np.geomspace(1e5, 1e10 / (1 + number), 24).reshape(2, 1, 3, 4)
+        pressure[0, 0, 0, 0] = np.nan
+        particles = {
+            "position": position * (1.0 + 0.1 * number),
+            "velocity": position,
+            "plastic_strain": number * position[:, 0],
+        }
+        writer.write(number, 1e-6 * number, {"pressure": pressure} if fluid else None, particles)
+    finish_run(directory)
+
+
+@pytest.mark.parametrize(("dimensions", "fluid"), [(1, False), (2, False), (2, True)])
+def test_solids_are_drawn(tmp_path, small_blocks, figures, dimensions, fluid):
+    write_bar(tmp_path, small_blocks, dimensions, fluid)
+    draw_summary(tmp_path)
+    assert_nothing_overlaps(figures[0])
+    discs = figures[0].findobj(EllipseCollection)
+    assert [len(d.get_offsets()) for d in discs] == ([] if dimensions == 1 else [80] * 4)
+    assert bool(figures[0].findobj(AxesImage)) is fluid
+
+
+def test_frames_show_the_middle_plane_of_three_dimensions(runs):
+    first, last = load_frames(runs[2] / "space", 4)
+    assert (first.time, last.time) == mpi_output.TIMES
+    assert first.extent == pytest.approx((0.0, 1.3, -1.0, 0.1))
+    y = -1.0 + (np.arange(11)[:, None] + 0.5) * 0.1
+    assert first.cells["pressure"] == pytest.approx(mpi_output.pressure(first.cell_centers, y, 3.45, 0.0), rel=1e-12)
+    near = np.abs(first.particles["position"][:, 2] - 3.45) <= 0.5 * first.spacing
+    assert near.all() and 0 < near.size < 200
+
+
+def test_a_picture_needs_field_files(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no field files"):
+        draw_summary(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "scale"),
+    [("Pa", 3e9, (1e9, "GPa")), ("m", 0.05, (1e-3, "mm")), ("s", 0.0, (1.0, "s")), ("kg/m³", 8e3, (1.0, "kg/m³"))],
+)
+def test_units_take_a_fitting_prefix(unit, largest, scale):
+    assert scaled(unit, largest) == scale

@@ -34,8 +34,8 @@ def build(
 ) -> SimpleNamespace:
     """Compile each driver, specialised for a scene, as a module of its own.
 
-    `constants` are the names a scene fixes, `bindings` the formulas it chooses for a name. Returns a namespace with the drivers
-    under their own names; compilation happens at a driver's first call and is kept on disk. Raises NotInSubset.
+    `constants` are the names a scene fixes, `bindings` the formulas it chooses for a name. Returns a namespace with the
+    drivers under their own names; compilation happens at a driver's first call and is kept on disk. Raises NotInSubset.
     """
     compiled = {}
     for driver in drivers:
@@ -64,7 +64,7 @@ def _load(name: str, text: str) -> ModuleType:
 
 
 class _Compiled:
-    """A driver that compiles at its first call, in one process of a machine at a time: the others then find it on disk."""
+    """A driver that compiles at its first call, in one process of a machine at a time: others then find it on disk."""
 
     def __init__(self, dispatcher: Callable, path: Path):
         self.dispatcher, self.path = dispatcher, path

@@ -1,7 +1,7 @@
 """Emission: drivers and all the formulas they reach -> the text of one module, specialised for a scene.
 
-The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be stale.
-CUDA C will be a second writer beside `numba_text`, of the same folded functions.
+The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be
+stale. CUDA C will be a second writer beside `numba_text`, of the same folded functions.
 """
 
 from __future__ import annotations

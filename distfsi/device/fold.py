@@ -1,7 +1,8 @@
 """Folding: one function of the formula subset with everything a scene fixes replaced by its value.
 
-The result is a plain `ast.FunctionDef` in which constants are literals, branches on constants are resolved, `static_range` loops are
-unrolled and arithmetic with 0 and 1 has vanished. Anything outside the subset is refused with the file and line it stands on.
+The result is a plain `ast.FunctionDef` in which constants are literals, branches on constants are resolved,
+`static_range` loops are unrolled and arithmetic with 0 and 1 has vanished. Anything outside the subset is refused with
+the module and line it stands on.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "len", "r
 _OPERATORS = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.USub: operator.neg, ast.Not: operator.not_,
-    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
-    ast.BitAnd: operator.and_, ast.BitOr: operator.or_, ast.LShift: operator.lshift, ast.RShift: operator.rshift,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge, ast.BitAnd: operator.and_, ast.BitOr: operator.or_, ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
 }  # fmt: skip
 
 
@@ -78,8 +80,11 @@ def constant_of(node: ast.expr) -> tuple[bool, object]:
 
 
 class Fold(ast.NodeTransformer):
-    """Folds one function. `lookup(name)` gives a scene constant or raises KeyError; `call(name)` gives the name a callee is emitted
-    under and, when the callee merely returns a constant, that constant."""
+    """Folds one function.
+
+    `lookup(name)` gives a scene constant; `call(name)` the name a callee is emitted under and, when the callee merely
+    returns a constant, that constant. Both raise KeyError for what they do not know.
+    """
 
     def __init__(
         self, source: Source, lookup: Callable[[str], object], call: Callable[[str], tuple[str, ast.expr | None]]
@@ -114,7 +119,7 @@ class Fold(ast.NodeTransformer):
         return ast.fix_missing_locations(tree)
 
     def refuse_integers(self, tree: ast.AST) -> None:
-        """Integers are for indices and for the arguments of other formulas; elsewhere they turn float32 into float64."""
+        """Integers are for indices and arguments of other formulas; elsewhere they turn float32 into float64."""
         for node in ast.iter_child_nodes(tree):
             index = isinstance(tree, ast.Subscript) and node is tree.slice
             argument = isinstance(tree, ast.Call) and tree.func.id not in MATH_WORDS
@@ -122,7 +127,7 @@ class Fold(ast.NodeTransformer):
                 raise self.refuse(node, f"write {node.value}.0: an integer would turn float32 into float64")
             self.refuse_integers(node)
 
-    # ---- statements ----------------------------------------------------------------------------------------------------
+    # ---- statements --------------------------------------------------------------------------------------------------
 
     def statements(self, body: list[ast.stmt]) -> list[ast.stmt]:
         out: list[ast.stmt] = []
@@ -206,7 +211,7 @@ class Fold(ast.NodeTransformer):
         node.value = self.visit(node.value)
         return node
 
-    # ---- expressions ---------------------------------------------------------------------------------------------------
+    # ---- expressions -------------------------------------------------------------------------------------------------
 
     def visit_Name(self, node: ast.Name):
         if not isinstance(node.ctx, ast.Load):
@@ -350,7 +355,7 @@ class Fold(ast.NodeTransformer):
             return node
         raise self.refuse(node, f"{type(node).__name__} is not in the subset")
 
-    # ---- unrolling -----------------------------------------------------------------------------------------------------
+    # ---- unrolling ---------------------------------------------------------------------------------------------------
 
     @staticmethod
     def is_static_range(node: ast.expr) -> bool:

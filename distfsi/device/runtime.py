@@ -1,8 +1,8 @@
 """What emitted numba modules import: the decorators behind the markers, and raw loads and stores.
 
-Fast rows need two things numba does not do by itself: arguments that do not alias (a compile option it has inside but does not
-show) and indexing without wrap-around. Both are held by tests/test_vectorised.py. Fast math stays off: NaN checks stay valid and
-results do not depend on how a loop was vectorised.
+Fast rows need two things numba does not do by itself: arguments that do not alias (a compile option it has inside but
+does not show) and indexing without wrap-around. Both are held by tests/test_vectorised.py. Fast math stays off: NaN
+checks stay valid and results do not depend on how a loop was vectorised.
 """
 
 from __future__ import annotations
@@ -80,8 +80,11 @@ def _two_to_the(typing_context, shifted):
 
 
 def _exponential(real: type, mantissa: int, degree: int, lowest: float, highest: float, split: int):
-    """exp(x) by x = n ln 2 + r and a polynomial in r, in arithmetic that vectorises (libm's does not) and has the same bits on
-    every device. Below `lowest` and above `highest` it stays at the value there. `split`: bits of ln 2 in its first part."""
+    """exp(x) by x = n ln 2 + r and a polynomial in r, in arithmetic that vectorises (libm's does not).
+
+    It has the same bits on every device. Below `lowest` and above `highest` it stays at the value there. `split`: bits
+    of ln 2 in its first part.
+    """
     shift, per_two = real(1.5 * 2.0**mantissa), real(1.0 / math.log(2.0))
     high = real(math.floor(math.log(2.0) * 2.0**split) / 2.0**split)
     low = real(Fraction(LN_2) - Fraction(float(high)))

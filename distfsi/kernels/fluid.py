@@ -6,8 +6,8 @@ A tile is computed row by row (x fastest), so that its working set stays in the 
     for each row:  slopes and fluxes along x; along y and z those of the row above roll forward
                    divergence, Runge-Kutta update and relaxation -> U_new
 
-P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes hold px values per variable. Flux rows have their velocity
-components rotated so that the normal one comes first.
+P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes hold px values per variable. Flux rows
+have their velocity components rotated so that the normal one comes first.
 """
 
 from distfsi.device.markers import driver, helper, load, row, store, workspace
@@ -24,7 +24,8 @@ from distfsi.physics.symbols import (
     updated,
 )
 
-# columns of the tile table: the block, the first cell (counted with ghosts), the cells, which domain sides the tile touches (bits)
+# columns of the tile table: the block, the first cell (counted with ghosts), the cells, which domain sides the tile
+# touches (bits)
 BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES = 0, 1, 2, 3, 4, 5, 6, 7
 
 
@@ -198,7 +199,8 @@ def advance_tiles(begin, end, chosen, tiles, U_n, U, U_new, through, b, dt, weig
 
 @row
 def signal_row(U, S, u, su, n, rx, ry, rz):
-    """S[i] = sum over axes of (|u| + c)/h, largest so far in column i; S[n + i] stays 0 as long as every signal is finite."""
+    """S[i] = sum over axes of (|u| + c)/h, largest so far in column i; S[n + i] stays 0 as long as every signal is
+    finite."""
     for i in range(n):
         W = primitives(tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)))
         c = sound_speed(W)

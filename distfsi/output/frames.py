@@ -35,6 +35,12 @@ class Frame:
         return 1 + (top > bottom)
 
     @property
+    def aspect(self) -> float:
+        """Height over width."""
+        left, right, bottom, top = self.extent
+        return (top - bottom) / (right - left)
+
+    @property
     def cell_centers(self) -> np.ndarray:
         """Positions x (nx,) [m] of a row of cells."""
         left, right, _, _ = self.extent

@@ -16,10 +16,11 @@ class History:
 
     def __init__(self, path: Path, columns: Sequence[str], communicator: Communicator):
         self._columns = list(columns)
-        self._file = None
-        if communicator.rank == 0:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            self._file = Path(path).open("w", newline="")
+        self._path = Path(path)
+        self._writes = communicator.rank == 0
+        if self._writes:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.unlink(missing_ok=True)
             self._write(self._columns)
 
     def append(self, values: Mapping[str, float | int | str]) -> None:
@@ -29,12 +30,12 @@ class History:
         """
         if values.keys() != set(self._columns):
             raise KeyError(f"history needs {self._columns}, got {list(values)}")
-        self._write([_exact(values[column]) for column in self._columns])
+        if self._writes:
+            self._write([_exact(values[column]) for column in self._columns])
 
     def _write(self, row: Sequence[str]) -> None:
-        if self._file is not None:
-            csv.writer(self._file, lineterminator="\n").writerow(row)
-            self._file.flush()
+        with self._path.open("a", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerow(row)
 
 
 def _exact(value: float | int | str) -> str:

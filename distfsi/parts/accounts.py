@@ -1,4 +1,5 @@
-"""What is kept: masses, momentum and energy of fluid and solid, what left the domain, and what the coupling made or lost."""
+"""What is kept: masses, momentum and energy of fluid and solid, what left the domain, and what the coupling made or
+lost."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ class Coupling:
             self._shape, self._lower, self._spacing, blocks.origin, blocks.extent, self._seen_cells,
             np.array(grid.cells), np.array(blocks.block_cells), blocks.curve_index, blocks.first,
         )  # fmt: skip
-        self._kick.reshape(blocks.local_count, D, -1)[block, :, cell] = 0.0
+        self._kick.reshape(-1, D, self._shape.prod())[block, :, cell] = 0.0
         self._ledger["wall"] -= self._per_block(block, self._passed)
         self._ledger["wall"][:, P : P + D] += self._per_block(home, impulse)
         return impulse

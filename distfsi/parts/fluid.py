@@ -32,7 +32,8 @@ LAST = len(SSP_RK3) - 1
 class Fluid:
     """Compressible flow on the blocks of this rank.
 
-    state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every step.
+    state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
+    step.
     """
 
     def __init__(self, scene: Scene, model, blocks: Blocks, team: cpu.Team):
@@ -62,7 +63,7 @@ class Fluid:
     def _lay_tiles(self, tile_cells: tuple[int, ...]) -> None:
         """Cut the blocks into tiles; those whose ghosts come from other ranks are computed last."""
         blocks, grid = self.blocks, self.blocks.grid
-        size = [min(t, n) for t, n in zip((*tile_cells, 1, 1), blocks.block_cells)]
+        size = [min(t, n) for t, n in zip((*tile_cells, 1, 1)[:3], blocks.block_cells, strict=True)]
         rows = []
         for block in range(blocks.local_count):
             extent, origin = blocks.extent[block], blocks.origin[block]
@@ -76,7 +77,7 @@ class Fluid:
         self.tiles = np.array(rows, dtype=np.int64).reshape(-1, 8)
         waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
         self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
-        self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts))
+        self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
         self._through = np.zeros((len(self.tiles), 6, self.model.conserved))
 
     def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
@@ -88,7 +89,7 @@ class Fluid:
                     bits |= 1 << (2 * axis + side)
         return bits
 
-    # ---- one step ------------------------------------------------------------------------------------------------------
+    # ---- one step ----------------------------------------------------------------------------------------------------
 
     @property
     def state(self) -> np.ndarray:
@@ -119,19 +120,20 @@ class Fluid:
         real = output.dtype.type
         rates = (real(dt / h) for h in self.blocks.grid.spacing)
         self.team.run(
-            self.kernels.advance_tiles, len(tiles), tiles, self.tiles, self.state, self.input_of(stage), output, self._through,
-            real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
+            self.kernels.advance_tiles, len(tiles), tiles, self.tiles, self.state, self.input_of(stage), output,
+            self._through, real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
         )  # fmt: skip
 
     def fastest_signal(self) -> float:
-        """Largest sum over axes of (|u| + c)/h [1/s] on this rank: CFL number per time step. NaN when a cell has no finite state."""
+        """Largest sum over axes of (|u| + c)/h [1/s] on this rank: CFL number per time step. NaN when a cell has no
+        finite state."""
         if not self.blocks.local_count:
             return 0.0
         real = self.state.dtype.type
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         self.team.run(
-            self.kernels.fastest_signals, self.blocks.local_count, self.state, self._first_active(), self.blocks.extent, *inverse,
-            self._fastest,
+            self.kernels.fastest_signals, self.blocks.local_count, self.state, self._first_active(),
+            self.blocks.extent, *inverse, self._fastest,
         )  # fmt: skip
         return float(np.max(self._fastest))
 
@@ -140,12 +142,12 @@ class Fluid:
         _, size_y, size_x = self.blocks.shape
         return (gz * size_y + gy) * size_x + gx
 
-    # ---- looking at it -------------------------------------------------------------------------------------------------
+    # ---- looking at it -----------------------------------------------------------------------------------------------
 
     def cells(self, block: int) -> np.ndarray:
         """View (variables, z, y, x) of the active cells of a local block."""
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
-        return self.state[(block, slice(None), *(slice(a, a + b) for a, b in zip(g, n)))]
+        return self.state[(block, slice(None), *(slice(a, a + b) for a, b in zip(g, n, strict=True)))]
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""
@@ -167,7 +169,7 @@ class Fluid:
         return totals[: self.model.conserved], totals[self.model.conserved :]
 
     def left_domain(self) -> np.ndarray:
-        """What has left through the domain's sides so far (conserved,); the wall's impulse is momentum that has left."""
+        """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""
         signed = self._through[:, 1::2].sum(axis=1) - self._through[:, 0::2].sum(axis=1)
         sums = np.zeros((self.blocks.local_count, self.model.conserved))
         np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)
@@ -206,7 +208,7 @@ class Fluid:
         if not len(bad):
             return
         z, y, x = bad[0]
-        position = [centers[i] for centers, i in zip(self.blocks.cell_centers(block), (x, y, z))][
+        position = [centers[i] for centers, i in zip(self.blocks.cell_centers(block), (x, y, z), strict=True)][
             : self.model.dimensions
         ]
         values = ", ".join(f"{value:.6g}" for value in W[:, z, y, x])
@@ -217,7 +219,7 @@ class Fluid:
 
     def _active(self, field: np.ndarray, block: int) -> np.ndarray:
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
-        return field[(block, *(slice(a, a + b) for a, b in zip(g, n)))].astype(bool)
+        return field[(block, *(slice(a, a + b) for a, b in zip(g, n, strict=True)))].astype(bool)
 
     def _cell_volume(self) -> float:
         return float(np.prod(self.blocks.grid.spacing[: self.model.dimensions]))

@@ -28,14 +28,14 @@ class InitialState:
         return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
 
     def paint(self, blocks: Blocks, field: np.ndarray) -> None:
-        """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part holds that part of
-        the region's mass, momentum, energy and volume."""
+        """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part
+        holds that part of the region's mass, momentum, energy and volume."""
         dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
             centers = blocks.cell_centers(block)[:dimensions]
             cells = field[
-                (block, slice(None), *(slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1])))
+                (block, slice(None), *(slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True)))
             ]
             for region, state in zip(self.fluid.regions, states, strict=True):
                 new = state[:, None, None, None]

@@ -1,4 +1,8 @@
-"""The solid: smoothed particles in an updated Lagrangian frame (paper, Sec. 2.1 and Appendix A)."""
+"""The solid: smoothed particles in an updated Lagrangian frame (paper, Sec. 2.1 and Appendix A).
+
+A step needs four messages per pair of ranks that are neighbours: who needs whom, the state, the corrected stress, the new
+velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the particles.
+"""
 
 from __future__ import annotations
 
@@ -50,12 +54,13 @@ class Solid:
         self.gravity = np.array(scene.gravity)
         self.eos, self.strength = eos_table(scene.solid.bodies), strength_table(scene.solid.bodies)
         self.exchange = ParticleExchange(blocks)
-        axes = range(self.dimensions)
+        axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
         self._matrix = tuple((a, b) for a in axes for b in axes)
+        self._components = self.dimensions * (self.dimensions + 1) // 2
         constants = {
             "DIMENSIONS": self.dimensions,
-            "COMPONENTS": self.dimensions * (self.dimensions + 1) // 2,
+            "COMPONENTS": self._components,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
         }
@@ -79,7 +84,7 @@ class Solid:
         c = {name: column[mine] for name, column in columns.items()}
         n = len(mine)
         c |= {name: np.zeros(n) for name in ("energy", "plastic_strain", "pressure", "sound_speed")}
-        c["deviator"] = np.zeros((n, self.dimensions * (self.dimensions + 1) // 2))
+        c["deviator"] = np.zeros((n, self._components))
         c["temperature"] = self.strength[c["body"], ROOM_COLUMN]
         self.columns = c
         self._find_blocks()

@@ -1,4 +1,5 @@
-"""Names that a scene fixes. Formulas import them from here; emission puts the scene's values and formulas in their place.
+"""Names that a scene fixes. Formulas import them from here; emission puts the scene's values and formulas in their
+place.
 
 Each symbol says what it stands for; a formula that is emitted while one of its symbols is still open is refused.
 """

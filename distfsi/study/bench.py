@@ -1,7 +1,7 @@
 """Speed of this machine on standard work, as JSON: whole time loops without output, best of several runs.
 
-cell_stages_per_second counts one Runge-Kutta stage of one cell; `share_of_kernel` is the loop's speed over that of its bare stage kernel,
-timed in the same run.
+cell_stages_per_second counts one Runge-Kutta stage of one cell; `share_of_kernel` is the loop's speed over that of its
+bare stage kernel, timed in the same run.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ COPPER = scene.MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
 COPPER_STRENGTH = scene.JohnsonCook(46e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 293.0, 1356.0, 383.0, 0.9)
 
 
-def two_gases(cells: tuple[int, ...], eos: tuple, inner: tuple[float, float], outer: tuple[float, float], precision="float64"):
+def two_gases(
+    cells: tuple[int, ...], eos: tuple, inner: tuple[float, float], outer: tuple[float, float], precision="float64"
+):
     """A ball of one material (density, pressure) in another, in a closed box; the standard fluid work."""
     D = len(cells)
     rest = (0.0,) * D

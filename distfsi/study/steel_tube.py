@@ -62,7 +62,7 @@ def _products_outside(path: Path, radius: float) -> float:
     """Largest volume fraction of the products in a cell wholly outside `radius`."""
     _, fields, lower, spacing = read_cells(path)
     fraction = fields["volume_fraction"][0]
-    y, x = (lower[a] + (np.arange(n) + 0.5) * spacing[a] for a, n in ((1, fraction.shape[0]), (0, fraction.shape[1])))
+    x, y = (lower[axis] + (np.arange(fraction.shape[1 - axis]) + 0.5) * spacing[axis] for axis in (0, 1))
     outside = np.hypot(x[None, :], y[:, None]) > radius + spacing[0]
     return float(np.nanmax(fraction[outside]))
 
@@ -82,7 +82,8 @@ def table(found: list[Wall]) -> str:
                 f"{1e6 * wall.time:5.1f} us"
                 f"  {1e3 * wall.inner_radius:6.2f} ({1e3 * reference.inner_radius:6.2f}, "
                 f"{100 * (wall.inner_radius / reference.inner_radius - 1):+5.1f} %)"
-                f"  {wall.velocity:5.0f} ({reference.mean_velocity:5.0f}, {100 * (wall.velocity / reference.mean_velocity - 1):+5.1f} %)"
+                f"  {wall.velocity:5.0f} ({reference.mean_velocity:5.0f}, "
+                f"{100 * (wall.velocity / reference.mean_velocity - 1):+5.1f} %)"
                 f"  {1e3 * wall.thickness:5.2f} ({1e3 * reference.thickness:5.2f})"
                 f"  {wall.pieces:6d}  {wall.products_outside:.1e}"
             )
