@@ -23,6 +23,12 @@ class Diverged(DistfsiError):
     exit_code = 3
 
 
+class OutputError(DistfsiError):
+    """Results could not be written; the message names the file, the cause and the space left. Raised on every rank."""
+
+    exit_code = 74  # EX_IOERR of sysexits.h
+
+
 class Stopped(DistfsiError):
     """The run was asked to stop early and left a restart file."""
 

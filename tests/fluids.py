@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from distfsi.model import FluidModel, fluid_model
-from distfsi.scene.description import Fluid, FluidEos, IdealGas, Jwl, Phase, StiffenedGas
+from distfsi.scene.description import Fluid, IdealGas, Jwl, Phase, StiffenedGas
 
 AIR = IdealGas(1.4)
 HELIUM = IdealGas(1.667)
@@ -21,10 +21,3 @@ def model_of(*names: str, dimensions: int = 1, gravity=None, limiter: str = "min
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64")
     domain = SimpleNamespace(dimensions=dimensions)
     return fluid_model(SimpleNamespace(fluid=fluid, domain=domain, gravity=gravity or (0.0,) * dimensions))
-
-
-def cold_pressure(eos: FluidEos, density: float) -> float:
-    """Pressure without heat; admissible states lie above it."""
-    from distfsi.scene.thermodynamics import cold_curve
-
-    return cold_curve(eos, density)[0]

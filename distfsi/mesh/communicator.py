@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -19,7 +19,7 @@ LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 class Communicator:
     """All ranks of the run. Every method except `abort` is collective: all ranks call it, in the same order.
 
-    `world` is the MPI communicator, for the other modules of this folder only.
+    `world` is the MPI communicator, for the other modules of this folder and for HDF5's MPI driver.
     """
 
     def __init__(self) -> None:
@@ -44,6 +44,18 @@ class Communicator:
         """The (pickled) values of all ranks in rank order, on every rank."""
         return self.world.allgather(value)
 
+    def bring(self, values: Sequence, rank: int) -> list:
+        """The (pickled) `values` of one rank, each in a message of its own, on rank 0; nothing on the others."""
+        if self.rank == rank == 0:
+            return list(values)
+        if self.rank == rank:
+            self.world.send(len(values), 0)
+            for value in values:
+                self.world.send(value, 0)
+        if self.rank > 0:
+            return []
+        return [self.world.recv(source=rank) for _ in range(self.world.recv(source=rank))]
+
     def concatenate(self, rows: np.ndarray) -> np.ndarray:
         """Rows (n, ...) of all ranks in rank order, on every rank; n may differ, dtype and row shape may not."""
         rows = np.ascontiguousarray(rows)
@@ -65,13 +77,26 @@ class Communicator:
     def write_at(self, path: str, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
         """Write this rank's C-contiguous `arrays` (maybe none) at its byte `offsets` into the existing file `path`.
 
-        The data is on disk when this returns. Raises mpi4py.MPI.Exception when the file cannot be opened or written.
+        The data is on disk when this returns. Raises OSError on all ranks when one of them cannot open or write.
         """
-        file = MPI.File.Open(self.world, os.fspath(path), MPI.MODE_WRONLY)
-        for offset, array in zip(offsets, arrays, strict=True):
-            file.Write_at(offset, [array.reshape(-1).view(np.uint8), MPI.BYTE])
-        file.Sync()
-        file.Close()
+        failures = []
+
+        def attempt(action: Callable, *arguments: object) -> MPI.File | None:
+            try:
+                return action(*arguments)
+            except MPI.Exception as error:
+                failures.append(" ".join(error.Get_error_string().split()))
+
+        file = attempt(MPI.File.Open, self.world, os.fspath(path), MPI.MODE_WRONLY)
+        if file is not None:  # collective: open on all ranks or on none
+            for offset, array in zip(offsets, arrays, strict=True):
+                if not failures:
+                    attempt(file.Write_at, offset, [array.reshape(-1).view(np.uint8), MPI.BYTE])
+            attempt(file.Sync)
+            attempt(file.Close)
+        failures = sum(self.allgather(failures), [])
+        if failures:
+            raise OSError(failures[0])
 
     def abort(self, code: int) -> None:
         """End all ranks at once; the launcher returns `code` where it can."""

@@ -13,6 +13,8 @@ class Communicator(Protocol):
     """The ranks of the run."""
 
     rank: int
+    size: int
+    world: Any  # what h5py's MPI driver takes
 
     def broadcast(self, value: Any) -> Any:
         """Rank 0's `value` on every rank."""
@@ -20,8 +22,11 @@ class Communicator(Protocol):
     def allgather(self, value: Any) -> list:
         """The values of all ranks, by rank, on every rank."""
 
+    def bring(self, values: Sequence[Any], rank: int) -> list:
+        """The `values` of one rank on rank 0; nothing elsewhere."""
+
     def write_at(self, path: Path, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
-        """Collective: write each of this rank's arrays at its byte offset of an existing file, and sync it."""
+        """Write each of this rank's arrays at its byte offset of an existing file; raises OSError on all ranks."""
 
 
 class Grid(Protocol):

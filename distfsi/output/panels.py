@@ -24,6 +24,8 @@ TIME_COLORS = ("0.55", "tab:blue")
 PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 DECADES = 100.0  # positive values whose largest and smallest differ by more get a logarithmic scale
 
+ROUNDING = 1e-12  # an energy that changes by less, relatively, is not drawn
+
 WIDTH = 12.0
 LEFT, BAR_RIGHT, BAR_BELOW = 0.9, 1.2, 0.75  # room for the labels of an axis, for a colour bar beside or below panels
 GAP, TITLE, XLABEL = 0.35, 0.4, 0.6  # between panels, above them, below the last of them
@@ -195,7 +197,9 @@ def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
     energies = {
         name: values - values[:1]
         for name, values in history.items()
-        if name.endswith("energy [J]") and not name.startswith("drift ") and np.any(values != values[:1])
+        if name.endswith("energy [J]")
+        and not name.startswith("drift ")
+        and np.ptp(values) > ROUNDING * np.abs(values).max()
     }
     panels = (
         ("change of energy [J]", energies),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 import time as clock
 
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as RichProgress
+from rich.table import Column
 
 from distfsi.output.interfaces import Communicator
 
@@ -23,11 +24,14 @@ class Progress:
         self._bar = self._start_bar() if self._shown and sys.stdout.isatty() else None
         self._interval = SECONDS_BETWEEN_REDRAWS if self._bar else SECONDS_BETWEEN_LINES
         self._reported_step = 0
-        self._reported_at = clock.monotonic()
+        self._reported_at: float | None = None
 
     def update(self, step: int, time: float, dt: float, limited_by: str, extra: str = "") -> None:
         """Report step number `step`, which reached `time` [s] with `dt` [s]; `limited_by` says what set `dt`."""
         now = clock.monotonic()
+        if self._reported_at is None:  # the first step compiles: the speed is measured from its end
+            self._reported_step, self._reported_at = step, now
+            return
         if not self._shown or now - self._reported_at < self._interval:
             return
         rate = (step - self._reported_step) / (now - self._reported_at)
@@ -51,7 +55,9 @@ class Progress:
             print(message, flush=True)
 
     def _start_bar(self) -> RichProgress:
-        bar = RichProgress(BarColumn(bar_width=24), TextColumn("{task.description}"), TimeElapsedColumn())
+        one_line = Column(no_wrap=True, overflow="ellipsis")
+        text = TextColumn("{task.description}", markup=False, table_column=one_line)
+        bar = RichProgress(BarColumn(bar_width=16), text)
         bar.add_task("", total=self._end_time)
         bar.start()
         return bar

@@ -149,6 +149,19 @@ class Fluid:
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
         return self.state[(block, slice(None), *(slice(a, a + b) for a, b in zip(g, n, strict=True)))]
 
+    def state_to_save(self) -> dict[str, dict[str, np.ndarray]]:
+        """What a restart file holds of the fluid; views, not copies."""
+        g, n = self.blocks.grid.ghosts[::-1], self.blocks.block_cells[::-1]
+        whole_blocks = tuple(slice(a, a + b) for a, b in zip(g, n, strict=True))
+        return {"cells": {"state": self.state[(..., *whole_blocks)]}, "sums": {"through": self._through}}
+
+    def restore(self, saved: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Continue from what `state_to_save` gave, on this rank's blocks."""
+        for block in range(self.blocks.local_count):
+            z, y, x = self.blocks.extent[block][::-1]
+            self.cells(block)[:] = saved["cells"]["state"][block, :, :z, :y, :x]
+        self._through[:] = saved["sums"]["through"]
+
     def memory(self) -> int:
         """Bytes of this rank's fields."""
         return sum(buffer.nbytes for buffer in self._buffers)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+from distfsi.scene import description, schema
 from distfsi.scene.description import (
     Body,
     Domain,
     Fluid,
     FluidState,
+    Gauge,
     Output,
+    Peaks,
     Performance,
     Phase,
     Region,
@@ -17,6 +22,7 @@ from distfsi.scene.description import (
 from distfsi.scene.schema import (
     DomainInput,
     FluidInput,
+    GaugeInput,
     OutputInput,
     PerformanceInput,
     SolidInput,
@@ -29,6 +35,8 @@ BLOCK_CELLS = ((512,), (128, 64), (64, 32, 32))
 TILE_CELLS = ((512,), (128, 32), (64, 8, 8))
 AXES = ("x", "y", "z")
 SIDES = ("low", "high")
+ARRIVAL = 0.01  # of the ambient pressure
+EACH_STEP = 0.0
 
 
 def build_domain(given: DomainInput) -> Domain:
@@ -85,9 +93,33 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     return Solid(bodies, given.smoothing, given.viscosity_alpha, given.viscosity_beta)
 
 
-def build_output(given: OutputInput, stem: str) -> Output:
+def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:
     """Where results go: out/`stem` unless the input names a directory."""
-    return Output(given.directory or f"out/{stem}", given.fields_every, given.history_every)
+    peaks = None
+    if given.peaks and fluid:
+        ambient, arrival = given.peaks.ambient_pressure, given.peaks.arrival_overpressure
+        ambient = fluid.regions[0].state.pressure if ambient is None else ambient
+        peaks = Peaks(ambient, ARRIVAL * abs(ambient) if arrival is None else arrival)
+    return Output(given.directory or f"out/{stem}", given.fields_every, given.history_every, peaks, given.schlieren)
+
+
+def build_gauges(given: Mapping[str, GaugeInput], end: float, bodies: Sequence[str]) -> tuple[Gauge, ...]:
+    """The gauges of a run until `end` [s]; bodies by their place in `bodies`."""
+    return tuple(_gauge(name, gauge, end, bodies) for name, gauge in given.items())
+
+
+def _gauge(name: str, given: GaugeInput, end: float, bodies: Sequence[str]) -> Gauge:
+    match given:
+        case schema.PointGauge(position=position, every=every):
+            return description.PointGauge(name, position, every or EACH_STEP)
+        case schema.LineGauge(start=start, end=stop, points=points, every=every):
+            return description.LineGauge(name, start, stop, points, every or end / 100)
+        case schema.PlaneGauge(axis=axis, position=position, every=every):
+            return description.PlaneGauge(name, AXES.index(axis), position, every or end / 100)
+        case schema.ParticleGauge(body=body, position=position, every=every):
+            return description.ParticleGauge(name, bodies.index(body), position, every or EACH_STEP)
+        case schema.BodyGauge(body=body, every=every):
+            return description.BodyGauge(name, bodies.index(body), every or EACH_STEP)
 
 
 def build_performance(given: PerformanceInput, dimensions: int) -> Performance:

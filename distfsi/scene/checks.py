@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, HalfSpace, Solid, Tube
-from distfsi.scene.faults import Fault, Path
+from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.packing import pack
-from distfsi.scene.schema import DomainInput, FluidInput, PerformanceInput, Sections
+from distfsi.scene.schema import (
+    BodyGauge,
+    DomainInput,
+    FluidInput,
+    GaugeInput,
+    LineGauge,
+    OutputInput,
+    ParticleGauge,
+    PerformanceInput,
+    PlaneGauge,
+    PointGauge,
+    Sections,
+)
 from distfsi.scene.shapes import bounding_box, contains
 from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
 
@@ -20,8 +32,13 @@ COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would l
 CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
 
 
-def check(sections: Sections, domain: Domain | None, fluid: Fluid | None, solid: Solid | None) -> Iterator[Fault]:
-    """Faults between parts that are valid in themselves; None stands for a part that is absent or invalid."""
+def check(
+    sections: Sections, present: Container[str], domain: Domain | None, fluid: Fluid | None, solid: Solid | None
+) -> Iterator[Fault]:
+    """Faults between parts that are valid in themselves; None stands for a part that is absent or invalid.
+
+    `present`: names of the sections of the input, the invalid ones among them.
+    """
     if fluid is not None:
         yield from check_fluid(sections.fluid, fluid)
     if domain is None:
@@ -33,6 +50,8 @@ def check(sections: Sections, domain: Domain | None, fluid: Fluid | None, solid:
         return  # nothing can be placed in a domain that is wrong itself
     if fluid is not None:
         yield from check_inflow(sections.fluid, domain)
+    yield from check_output(sections.output, present, domain)
+    yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
         yield from check_solid(solid, domain)
         if fluid is not None:
@@ -148,6 +167,47 @@ def check_coupling(solid: Solid, domain: Domain) -> Iterator[Fault]:
             path = ("solid", "bodies", body.name, "spacing")
             text = f"{body.spacing:.6g} m is too coarse for the fluid cells; expected at most {coarsest:.6g} m"
             yield Fault(path, f"{text}, {COARSEST_SPACING} of the smallest cell; half a cell is better")
+
+
+def check_output(given: OutputInput, present: Container[str], domain: Domain) -> Iterator[Fault]:
+    """Fields of the cells need cells."""
+    for key in ("peaks", "schlieren"):
+        if getattr(given, key) and "fluid" not in present:
+            yield Fault(("output", key), "needs a fluid")
+    if given.schlieren and domain.dimensions == 1:
+        yield Fault(("output", "schlieren"), "needs two or three dimensions")
+
+
+def check_gauges(
+    given: Mapping[str, GaugeInput], present: Container[str], domain: Domain, solid: Solid | None
+) -> Iterator[Fault]:
+    """Gauges have something to measure, inside the domain."""
+    for name, gauge in given.items():
+        path = ("gauges", name)
+        material = "solid" if isinstance(gauge, ParticleGauge | BodyGauge) else "fluid"
+        if material not in present:
+            yield Fault((*path, "kind"), f"'{gauge.kind}' needs a {material}")
+        elif material == "fluid":
+            yield from _check_place(path, gauge, domain)
+        elif solid is not None and gauge.body not in (bodies := [body.name for body in solid.bodies]):
+            yield Fault((*path, "body"), f"'{gauge.body}' is no body" + one_of(bodies, gauge.body))
+
+
+def _check_place(path: Path, gauge: PointGauge | LineGauge | PlaneGauge, domain: Domain) -> Iterator[Fault]:
+    ends = dict(zip(AXES, zip(domain.lower, domain.upper, strict=True), strict=False))
+    match gauge:
+        case PointGauge(position=position):
+            places = {"position": dict(zip(AXES, position, strict=False))}
+        case LineGauge(start=start, end=end):
+            places = {"from": dict(zip(AXES, start, strict=False)), "to": dict(zip(AXES, end, strict=False))}
+        case PlaneGauge(axis=axis, position=position):
+            if domain.dimensions == 1 or axis not in ends:
+                yield Fault((*path, "axis"), f"'{axis}' in a domain of {domain.dimensions} dimension(s)")
+                return
+            places = {"position": {axis: position}}
+    for key, place in places.items():
+        if not all(ends[axis][0] <= x <= ends[axis][1] for axis, x in place.items()):
+            yield Fault((*path, key), "lies outside the domain")
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

@@ -238,12 +238,81 @@ class Time:
 
 
 @dataclass(frozen=True)
+class Peaks:
+    """What the cells remember of a blast: overpressure is above `ambient_pressure` [Pa]; a wave has arrived when it
+    reaches `arrival_overpressure` [Pa]."""
+
+    ambient_pressure: float
+    arrival_overpressure: float
+
+
+@dataclass(frozen=True)
 class Output:
-    """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps."""
+    """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
+
+    `peaks` (None: not kept) and `schlieren` are written with the cells.
+    """
 
     directory: str
     fields_every: float
     history_every: int
+    peaks: Peaks | None = None
+    schlieren: bool = False
+
+
+# ---- gauges: each samples `every` so many seconds, 0: at each step --------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PointGauge:
+    """The fluid at `position` [m]."""
+
+    name: str
+    position: tuple[float, ...]
+    every: float
+
+
+@dataclass(frozen=True)
+class LineGauge:
+    """The fluid at so many equidistant `points` from `start` to `end` [m], both among them."""
+
+    name: str
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    points: int
+    every: float
+
+
+@dataclass(frozen=True)
+class PlaneGauge:
+    """The layer of cells that holds the plane normal to `axis` at `position` [m]."""
+
+    name: str
+    axis: int
+    position: float
+    every: float
+
+
+@dataclass(frozen=True)
+class ParticleGauge:
+    """The particle of `body` (an index) that is nearest to `position` [m] at the start, wherever it goes."""
+
+    name: str
+    body: int
+    position: tuple[float, ...]
+    every: float
+
+
+@dataclass(frozen=True)
+class BodyGauge:
+    """The whole of `body` (an index): its motion and the force of the fluid on it."""
+
+    name: str
+    body: int
+    every: float
+
+
+Gauge = PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge
 
 
 @dataclass(frozen=True)
@@ -266,3 +335,4 @@ class Scene:
     solid: Solid | None
     output: Output
     performance: Performance
+    gauges: tuple[Gauge, ...] = ()

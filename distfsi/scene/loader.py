@@ -71,7 +71,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     dimensions = domain.dimensions if domain else 1
     fluid = build.build_fluid(sections.fluid, dimensions) if sections.fluid else None
     solid = build.build_solid(sections.solid, dimensions) if sections.solid else None
-    faults = list(checks.check(sections, domain, fluid, solid))
+    faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))
     if faults or not isinstance(sections, Input):
@@ -83,7 +83,8 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         gravity=sections.domain.gravity or (0.0,) * dimensions,
         fluid=fluid,
         solid=solid,
-        output=build.build_output(sections.output, stem),
+        output=build.build_output(sections.output, stem, fluid),
         performance=build.build_performance(sections.performance, dimensions),
+        gauges=build.build_gauges(sections.gauges, sections.time.end, list(sections.solid.bodies if solid else ())),
     )
     return scene, faults

@@ -40,6 +40,8 @@ SECTIONS = {
     "`strength` of a body": ("NoStrength", "Elastic", "PerfectlyPlastic", "JohnsonCook"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube"),
     "`[output]`": ("OutputInput",),
+    "`[output.peaks]`": ("PeaksInput",),
+    "`[gauges.NAME]`": ("PointGauge", "LineGauge", "PlaneGauge", "ParticleGauge", "BodyGauge"),
     "`[performance]`": ("PerformanceInput",),
 }
 TABLE_HEAD = ["| key | value | default | meaning |", "|---|---|---|---|"]
@@ -75,6 +77,8 @@ def _row(key: str, node: Json, required: bool) -> str:
 
 
 def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
     return f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
@@ -100,6 +104,8 @@ def _values(node: Json) -> str:
         if "integer" in option.get("type", ()):
             return "whole number" + ("s, one per axis" if "array" in option["type"] else "")
     types = {option.get("type") for option in options}
+    if "boolean" in types:
+        return "`true`, `false`" + (", table" if any("$ref" in option for option in options) else "")
     return "text" if "string" in types else "list of tables" if "array" in types else "table"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
 from distfsi.scene.mirrors import PhaseInput, Shape, SolidEos, Strength
@@ -16,6 +16,7 @@ from distfsi.scene.values import (
     Length,
     PhaseName,
     Position,
+    PositivePressure,
     Pressure,
     Table,
     Velocity,
@@ -130,12 +131,91 @@ class SolidInput(Table):
 # ---- the whole -------------------------------------------------------------------------------------------------------
 
 
+class PeaksInput(Table):
+    """What the cells remember: peak overpressure and dynamic pressure, positive impulse, time of arrival."""
+
+    ambient_pressure: Pressure | None = Field(
+        None, description="pressure that overpressure counts from; default that of the first region"
+    )
+    arrival_overpressure: PositivePressure | None = Field(
+        None, description="a wave has arrived at this overpressure; default 1 % of the ambient pressure"
+    )
+
+
+def _truth_as_table(value: Any) -> Any:
+    return {True: {}, False: None}[value] if isinstance(value, bool) else value
+
+
 class OutputInput(Table):
     """What is written, where and when."""
 
     directory: str | None = Field(None, description="default: out/ and the input file's name")
     fields_every: quantity("s", ge=0.0) = Field(0.0, description="time between field outputs; 0: first and last only")
     history_every: Count = Field(10, description="steps between lines of the history")
+    peaks: Annotated[PeaksInput | None, BeforeValidator(_truth_as_table, json_schema_input_type=PeaksInput | bool)] = (
+        Field(None, description="true or a table: also write what the cells remember of a blast")
+    )
+    schlieren: bool = Field(
+        False, strict=True, description="also write the size of the density gradient over its largest value at the time; 2D and 3D"
+    )
+
+
+# ---- gauges ----------------------------------------------------------------------------------------------------------
+
+Interval = quantity("s", gt=0.0) | None
+EACH_STEP = "time between samples; default each step"
+HUNDREDTH = "time between samples; default a hundredth of the run"
+
+
+class PointGauge(Table):
+    """The fluid at a point: out/gauges/NAME.csv.
+
+    Values are linear between cell centers; covered cells do not count, and in a covered cell there is no value (nan).
+    """
+
+    kind: Literal["point"]
+    position: Position = Field(description="where")
+    every: Interval = Field(None, description=EACH_STEP)
+
+
+class LineGauge(Table):
+    """The fluid at equidistant points of a line: one row per point and time, values as for a point."""
+
+    kind: Literal["line"]
+    start: Position = Field(alias="from", description="first point")
+    end: Position = Field(alias="to", description="last point")
+    points: Annotated[int, Field(strict=True, ge=2)] = Field(description="number of points, the ends included")
+    every: Interval = Field(None, description=HUNDREDTH)
+
+
+class PlaneGauge(Table):
+    """The layer of cells that a plane passes through, as field files in out/gauges/NAME/; 2D and 3D."""
+
+    kind: Literal["plane"]
+    axis: Literal["x", "y", "z"] = Field(description="axis that the plane is normal to")
+    position: quantity("m") = Field(description="where the plane cuts the axis")
+    every: Interval = Field(None, description=HUNDREDTH)
+
+
+class ParticleGauge(Table):
+    """A particle of a body: out/gauges/NAME.csv. Velocities are those of half a step before."""
+
+    kind: Literal["particle"]
+    body: str = Field(description="name of the body")
+    position: Position = Field(description="the particle nearest to it at the start")
+    every: Interval = Field(None, description=EACH_STEP)
+
+
+class BodyGauge(Table):
+    """A body as a whole: motion of its center of mass, momentum, and the fluid's mean force on it in the last step."""
+
+    kind: Literal["body"]
+    body: str = Field(description="name of the body")
+    every: Interval = Field(None, description=EACH_STEP)
+
+
+GaugeInput = Annotated[PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge, Field(discriminator="kind")]
+GaugeName = Annotated[str, Field(pattern=r"^[\w-]+$")]
 
 
 class PerformanceInput(Table):
@@ -154,6 +234,7 @@ class Sections(Table):
     fluid: FluidInput | None = None
     solid: SolidInput | None = None
     output: OutputInput = OutputInput()
+    gauges: dict[GaugeName, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     performance: PerformanceInput = PerformanceInput()
 
 

@@ -1,0 +1,191 @@
+"""How the ranks write one HDF5 file together. Three ways, `[output] hdf5`; the datasets hold the same bytes by all.
+
+Errors of the disk become OutputError, on every rank or on none: a rank that fails alone would leave the others waiting.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import h5py
+import numpy as np
+
+from distfsi.errors import InputError, OutputError
+from distfsi.output.interfaces import Communicator
+
+LayDown = Callable[[h5py.File], Mapping[str, h5py.Dataset]]
+Piece = tuple[str, tuple[int, ...], np.ndarray]  # name of the dataset, index of the first value, values
+
+
+class Storage(Protocol):
+    """A way to write HDF5."""
+
+    def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
+        """Write a new file `path`; collective. Raises OutputError on all ranks.
+
+        `lay_down` fills an open file, by the same rule on every rank, and returns datasets of `create_dataset` by name.
+        `pieces`: what this rank puts there, maybe nothing. A piece is one whole chunk, which may reach beyond the
+        dataset's end, or, in a dataset without chunks, some rows.
+        """
+
+
+def storage(name: str, communicator: Communicator) -> Storage:
+    """The storage called "mpi-io", "mpio" or "gather". Raises InputError when this h5py has no "mpio"."""
+    if name == "mpio" and not h5py.get_config().mpi:
+        remedy = 'launch/install-parallel-hdf5.sh builds one; "mpi-io" writes from all ranks without'
+        raise InputError([f'output.hdf5: "mpio" needs an h5py with parallel HDF5, this one has none: {remedy}'])
+    return {"mpi-io": MpiIo, "mpio": ParallelHdf5, "gather": Gather}[name](communicator)
+
+
+class MpiIo:
+    """Rank 0 lays down the file, and all ranks write raw values to their final places in it through MPI-IO."""
+
+    def __init__(self, communicator: Communicator):
+        self._communicator = communicator
+
+    def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
+        places = on_root(self._communicator, path, lambda: _create(path, lay_down))
+        pieces = [piece for piece in pieces if piece[2].size]
+        offsets = [places[name].offset(start) for name, start, _ in pieces]
+        with naming(path):
+            self._communicator.write_at(path, offsets, [np.ascontiguousarray(values) for _, _, values in pieces])
+
+
+class Gather:
+    """Rank 0 does all the writing, and receives what the other ranks have, one rank after the other."""
+
+    def __init__(self, communicator: Communicator):
+        self._communicator = communicator
+
+    def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
+        places = on_root(self._communicator, path, lambda: _create(path, lay_down))
+        for rank in range(self._communicator.size):
+            received = self._communicator.bring(pieces, rank)
+            on_root(self._communicator, path, lambda received=received: _add(path, places, received))
+
+
+class ParallelHdf5:
+    """All ranks open the file through HDF5's own MPI driver."""
+
+    def __init__(self, communicator: Communicator):
+        self._communicator = communicator
+
+    def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
+        def write() -> None:
+            with h5py.File(path, "w", driver="mpio", comm=self._communicator.world) as file:
+                datasets = lay_down(file)
+                # Each by itself, not collectively: ranks have different numbers of pieces.
+                for name, start, values in pieces:
+                    _put(datasets[name], start, values)
+                file.flush()
+
+        _, failure = _attempt(path, write)
+        _raise_first(self._communicator.allgather(failure))
+
+
+# ---- the file's layout -----------------------------------------------------------------------------------------------
+
+
+def create_dataset(
+    group: h5py.Group, name: str, shape: Sequence[int], dtype: np.dtype, chunks: Sequence[int] | None = None
+) -> h5py.Dataset:
+    """A dataset whose place in the file is settled at once and is not filled."""
+    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    return group.create_dataset(name, shape, dtype, chunks=chunks, fill_time="never", dcpl=layout)
+
+
+class Places:
+    """Where in its file a dataset of `create_dataset` has its values."""
+
+    def __init__(self, dataset: h5py.Dataset):
+        self._itemsize = dataset.dtype.itemsize
+        self._chunk = dataset.chunks or dataset.shape
+        if dataset.chunks is None:
+            self._bytes = np.full((1,) * dataset.ndim, dataset.id.get_offset() or 0)
+            return
+        self._bytes = np.zeros([-(-n // c) for n, c in zip(dataset.shape, self._chunk, strict=True)], dtype=np.int64)
+
+        def note(stored) -> None:
+            self._bytes[tuple(np.floor_divide(stored.chunk_offset, self._chunk))] = stored.byte_offset
+
+        dataset.id.chunk_iter(note)
+
+    def offset(self, start: Sequence[int]) -> int:
+        """Byte offset of the value at index `start`."""
+        chunk, inside = np.divmod(start, self._chunk)
+        return int(self._bytes[tuple(chunk)] + np.ravel_multi_index(inside, self._chunk) * self._itemsize)
+
+
+def _create(path: Path, lay_down: LayDown) -> dict[str, Places]:
+    with h5py.File(path, "w") as file:
+        return {name: Places(dataset) for name, dataset in lay_down(file).items()}
+
+
+def _add(path: Path, places: Mapping[str, Places], pieces: Sequence[Piece]) -> None:
+    """Write raw values to their places."""
+    with path.open("r+b") as file:
+        for name, start, values in pieces:
+            if values.size:
+                file.seek(places[name].offset(start))
+                file.write(np.ascontiguousarray(values))
+
+
+def _put(dataset: h5py.Dataset, start: Sequence[int], values: np.ndarray) -> None:
+    """Write the part of a piece that lies inside the dataset."""
+    counts = [min(n, end - first) for n, end, first in zip(values.shape, dataset.shape, start, strict=True)]
+    if values.size:
+        target = tuple(slice(first, first + n) for first, n in zip(start, counts, strict=True))
+        dataset[target] = values[tuple(map(slice, counts))]
+
+
+# ---- errors ----------------------------------------------------------------------------------------------------------
+
+
+def on_root(communicator: Communicator, path: Path, action: Callable[[], Any]) -> Any:
+    """What `action`, which writes `path`, returns on rank 0, on every rank; its OSError is every rank's OutputError."""
+    outcome = _attempt(path, action) if communicator.rank == 0 else None
+    result, failure = communicator.broadcast(outcome)
+    _raise_first([failure])
+    return result
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Turn an OSError inside into an OutputError that names the file, the cause and the space left."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:  # RuntimeError: HDF5, when it cannot close a file on a full disk
+        raise OutputError(f"{path} could not be written: {_cause(error)}; {_free(path)}") from error
+
+
+def _attempt(path: Path, action: Callable[[], Any]) -> tuple[Any, str]:
+    """The result of an action, and why it failed (empty if it did not)."""
+    try:
+        with naming(path):
+            return action(), ""
+    except OutputError as error:
+        return None, str(error)
+
+
+def _raise_first(failures: Sequence[str]) -> None:
+    for failure in filter(None, failures):
+        raise OutputError(failure)
+
+
+def _cause(error: OSError | RuntimeError) -> str:
+    """The system's words for an error, also for one that HDF5 or MPI-IO wrap in theirs."""
+    number = getattr(error, "errno", None) or next(iter(re.findall(r"errno = (\d+)", str(error))), None)
+    return os.strerror(int(number)) if number else str(error)
+
+
+def _free(path: Path) -> str:
+    """How much space is left where a file lies or would lie."""
+    folder = next(parent for parent in path.absolute().parents if parent.is_dir())
+    return f"{shutil.disk_usage(folder).free / 1e6:,.1f} MB are free there"

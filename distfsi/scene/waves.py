@@ -1,0 +1,89 @@
+"""How fast waves run when two fluid states meet: the exact Riemann problem for any of the input's equations of state.
+
+p = p_cold(rho) + G rho (e - e_cold(rho)); shocks by the Rankine-Hugoniot conditions, rarefactions along isentropes.
+"""
+
+from __future__ import annotations
+
+from math import exp, log, sqrt
+from typing import NamedTuple
+
+from scipy.optimize import brentq
+
+from distfsi.scene.description import FluidEos
+from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
+
+ISENTROPE_STEPS = 100
+HIGHEST = 100.0  # times the higher of two pressures, where the pressure between them is sought
+LOWEST = 1e-6  # times the lower
+DENSEST = 1e3  # times the density ahead of a shock, where that behind it is sought
+
+
+class Side(NamedTuple):
+    """One state of a Riemann problem; `velocity` [m/s] points towards the other one."""
+
+    eos: FluidEos
+    density: float
+    pressure: float
+    velocity: float
+
+
+def fastest_signal(left: Side, right: Side) -> float:
+    """Largest |u| + c [m/s] in the two states and in those that form between them.
+
+    States of tension, and such that leave a vacuum between them, count as they are.
+    """
+    fastest = max(abs(side.velocity) + sound_speed(side.eos, side.density, side.pressure) for side in (left, right))
+    low, high = LOWEST * min(left.pressure, right.pressure), HIGHEST * max(left.pressure, right.pressure)
+    if low <= 0.0:
+        return fastest
+
+    def approach(logarithm: float) -> float:
+        return sum(side.velocity - _behind(side, exp(logarithm))[1] for side in (left, right))
+
+    if approach(log(low)) <= 0.0 or approach(log(high)) >= 0.0:
+        return fastest
+    p = exp(brentq(approach, log(low), log(high), xtol=1e-6))
+    for side in (left, right):
+        density, change = _behind(side, p)
+        fastest = max(fastest, abs(side.velocity - change) + sound_speed(side.eos, density, p))
+    return fastest
+
+
+def _behind(side: Side, p: float) -> tuple[float, float]:
+    """Density [kg/m3] behind the wave that brings a side to the pressure `p`, and by how much it slows it [m/s]."""
+    return _shock(side, p) if p > side.pressure else _rarefaction(side, p)
+
+
+def _shock(side: Side, p: float) -> tuple[float, float]:
+    eos, rho0, p0, _ = side
+    e0 = energy(eos, rho0, p0)
+
+    def excess(rho: float) -> float:
+        return pressure(eos, rho, e0 + 0.5 * (p + p0) * (1.0 / rho0 - 1.0 / rho)) - p
+
+    rho = rho0
+    while excess(rho) < 0.0 and rho < DENSEST * rho0:
+        rho *= 1.1
+    if excess(rho) >= 0.0:
+        rho = brentq(excess, rho0, rho, xtol=1e-9 * rho0)
+    return rho, sqrt((p - p0) * (1.0 / rho0 - 1.0 / rho))
+
+
+def _rarefaction(side: Side, p: float) -> tuple[float, float]:
+    """Along d rho = dp/c2 and du = dp/(rho c), by the midpoint rule in equal ratios of the pressure."""
+    rho, here, change = side.density, side.pressure, 0.0
+    ratio = (p / here) ** (1.0 / ISENTROPE_STEPS)
+    for _ in range(ISENTROPE_STEPS):
+        there = here * ratio
+        middle = sqrt(here * there)
+        half = rho + (middle - here) / sound_speed(side.eos, rho, here) ** 2
+        c = sound_speed(side.eos, half, middle)
+        change += (there - here) / (half * c)
+        rho, here = rho + (there - here) / c**2, there
+    return rho, change
+
+
+def sound_speed(eos: FluidEos, density: float, p: float) -> float:
+    """Speed of sound [m/s]; where there is none, next to nothing."""
+    return sqrt(max(sound_speed_squared(eos, density, p), 1e-30))
