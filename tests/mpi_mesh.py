@@ -203,15 +203,22 @@ def check_particles(communicator, grid, block_cells, number, reach):
     mine = exchange.migrate(mine)
     check_own(blocks, everything, mine)
     check_own(blocks, everything, exchange.migrate(mine))  # nothing moved
-    check_ghost_particles(blocks, everything, mine, exchange.ghosts(mine["position"], mine["id"], reach), reach)
+    nothing = np.empty(0, dtype=np.int64)
+    check_ghost_particles(
+        blocks, everything, mine, exchange.ghosts(mine["position"], mine["id"], reach), reach, nothing
+    )
+    bonded = np.random.default_rng(communicator.rank).choice(everything["id"], 40)  # near, far and own ones
+    plan = exchange.ghosts(mine["position"], mine["id"], reach, bonded)
+    check_ghost_particles(blocks, everything, mine, plan, reach, bonded)
 
 
-def expected_ghosts(blocks, everything, reach):
-    """Rows of the particles of other ranks within reach of this rank's blocks, in (block, id) order."""
+def expected_ghosts(blocks, everything, reach, bonded):
+    """Rows of the others' particles within reach of this rank's blocks or bonded to its own, in (block, id) order."""
     low, high = all_boxes(blocks)
     own = blocks.owners == blocks.communicator.rank
     position = everything["position"][:, None]
     close = ((position >= low[own] - reach) & (position <= high[own] + reach)).all(axis=2).any(axis=1)
+    close |= np.isin(everything["id"], bonded)
     block = expected_blocks(blocks, everything["position"])
     order = np.lexsort((everything["id"], block))
     return order[close[order] & ~own[block[order]]]
@@ -227,9 +234,9 @@ def nearest_planes(grid, position):
     return places
 
 
-def check_ghost_particles(blocks, everything, mine, plan, reach):
+def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     """The plan has the right particles, ghosts and images, and each of them gets the right values."""
-    ghosts = expected_ghosts(blocks, everything, reach)
+    ghosts = expected_ghosts(blocks, everything, reach, bonded)
     ids = np.concatenate([mine["id"], everything["id"][ghosts]])
     assert plan.own == len(mine["id"])
     np.testing.assert_array_equal(plan.key[: len(ids)], 8 * ids)

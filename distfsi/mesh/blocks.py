@@ -5,6 +5,7 @@ Index axes are x, y, z in this order everywhere except in array shapes, where x 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,13 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.curve import deal, morton_keys
 
 GHOSTS = 2  # layers of ghost cells on each side of every used axis
+
+# What a part of a run must keep to go on, by kind and name, in a form that any number of ranks can take up:
+#   cells      (local blocks, ..., bz, by, bx): whole blocks without ghosts
+#   particles  (own, ...): rows in the order of (block, id), wherever a restart needs them
+#   sums       (rows, ...): block by block; only what each adds to the total of all rows of all ranks matters
+#   values     the same on all ranks
+Snapshot = Mapping[str, Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -98,6 +106,11 @@ class Blocks:
     def allocate(self, variables: int, dtype: type = np.float64) -> np.ndarray:
         """A field of zeros (local_count, variables, Z, Y, X)."""
         return np.zeros((self.local_count, variables, *self.shape), dtype=dtype)
+
+    def without_ghosts(self, field: np.ndarray) -> np.ndarray:
+        """View (..., bz, by, bx) of a field (..., Z, Y, X): whole blocks, also where they are partly filled."""
+        ghosts, cells = self.grid.ghosts[::-1], self.block_cells[::-1]
+        return field[(..., *(slice(g, g + n) for g, n in zip(ghosts, cells, strict=True)))]
 
     def coordinates_of(self, positions: np.ndarray) -> np.ndarray:
         """Coordinates (n, 3) of the block that each of `positions` (n, dimensions) [m] is in or, outside, nearest to.

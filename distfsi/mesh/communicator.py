@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from mpi4py import MPI
@@ -80,27 +82,41 @@ class Communicator:
         The data is on disk when this returns. Raises OSError on all ranks when one of them cannot open or write.
         """
         failures = []
-
-        def attempt(action: Callable, *arguments: object) -> MPI.File | None:
-            try:
-                return action(*arguments)
-            except MPI.Exception as error:
-                failures.append(" ".join(error.Get_error_string().split()))
-
-        file = attempt(MPI.File.Open, self.world, os.fspath(path), MPI.MODE_WRONLY)
-        if file is not None:  # collective: open on all ranks or on none
-            for offset, array in zip(offsets, arrays, strict=True):
-                if not failures:
-                    attempt(file.Write_at, offset, [array.reshape(-1).view(np.uint8), MPI.BYTE])
-            attempt(file.Sync)
-            attempt(file.Close)
-        failures = sum(self.allgather(failures), [])
-        if failures:
-            raise OSError(failures[0])
+        with _noting(failures):
+            file = MPI.File.Open(self.world, os.fspath(path), MPI.MODE_WRONLY)
+        if not failures:  # collective: open on all ranks or on none
+            with _noting(failures):
+                for offset, array in zip(offsets, arrays, strict=True):
+                    _write_whole(file, offset, array)
+            for finish in (file.Sync, file.Close):
+                with _noting(failures):
+                    finish()
+        for failure in itertools.chain(*self.allgather(failures)):
+            raise OSError(failure)
 
     def abort(self, code: int) -> None:
         """End all ranks at once; the launcher returns `code` where it can."""
         self.world.Abort(code)
+
+
+@contextmanager
+def _noting(failures: list[str]) -> Iterator[None]:
+    """Note an error of MPI-IO instead of raising it: the other ranks wait for this one's next collective call."""
+    try:
+        yield
+    except MPI.Exception as error:
+        # The last line of an error stack is the cause.
+        failures.append(error.Get_error_string().splitlines()[-1].split(": ")[-1])
+    except OSError as error:
+        failures.append(str(error))
+
+
+def _write_whole(file: MPI.File, offset: int, array: np.ndarray) -> None:
+    status = MPI.Status()
+    file.Write_at(offset, [array.reshape(-1).view(np.uint8), MPI.BYTE], status)
+    written = status.Get_count(MPI.BYTE)
+    if written != array.nbytes:  # all that Open MPI tells of a full disk
+        raise OSError(f"only {written} of {array.nbytes} bytes were taken")
 
 
 def install_abort_on_exception(communicator: Communicator) -> None:

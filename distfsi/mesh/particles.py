@@ -88,17 +88,21 @@ class ParticleExchange:
         order = np.lexsort((columns["id"], block))
         return {name: column[order] for name, column in columns.items()}
 
-    def ghosts(self, position: np.ndarray, id: np.ndarray, reach: float) -> GhostPlan:
+    def ghosts(self, position: np.ndarray, id: np.ndarray, reach: float, bonded: np.ndarray | None = None) -> GhostPlan:
         """Collective. Who needs copies of which particles, and the images at symmetry planes.
 
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
         at the ends of the grid extend to infinity. Particles and ghosts within `reach` of symmetry planes have images.
-        `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`.
+        `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`, on
+        all ranks or none, holds ids of particles that this rank needs as ghosts wherever they are.
         Raises InputError when a particle could have two images along one axis.
         """
         own = len(id)
         planes = self._planes(reach)
-        ranks, rows = self._needed(position, reach)
+        pairs = self._near(position, reach)
+        if bonded is not None:
+            pairs += self._bonded(id, bonded)
+        ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
         arrived = route.transfer(pack({"position": position, "id": id}, rows))
         position, id = np.concatenate([position, arrived["position"]]), np.concatenate([id, arrived["id"]])
@@ -112,8 +116,15 @@ class ParticleExchange:
         key = np.concatenate([id * IMAGES, id[source] * IMAGES + mask])
         return GhostPlan(own, len(key), key, route, rows, source, mask, plane[source])
 
-    def _needed(self, position: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """(ranks, rows) of the own particles that other ranks need, ascending."""
+    def _bonded(self, id: np.ndarray, bonded: np.ndarray) -> list[np.ndarray]:
+        """rank * own + row of the own particles whose ids other ranks ask for."""
+        communicator = self.blocks.communicator
+        asked = communicator.allgather(np.setdiff1d(bonded, id))
+        others = (rank for rank in range(communicator.size) if rank != communicator.rank)
+        return [rank * len(id) + np.flatnonzero(np.isin(id, asked[rank])) for rank in others]
+
+    def _near(self, position: np.ndarray, reach: float) -> list[np.ndarray]:
+        """rank * own + row of the own particles within `reach` of other ranks' blocks."""
         blocks = self.blocks
         lowest, highest = blocks.coordinates_of(position - reach), blocks.coordinates_of(position + reach)
         near = np.flatnonzero(blocks.index_at(lowest) != blocks.index_at(highest))
@@ -125,7 +136,7 @@ class ParticleExchange:
             rank = blocks.owners[blocks.index_at(block[:, inside].T)]
             other = rank != blocks.communicator.rank
             pairs.append(rank[other] * len(position) + near[inside][other])
-        return np.divmod(np.unique(np.concatenate(pairs)), max(len(position), 1))
+        return pairs
 
     def _planes(self, reach: float) -> list[tuple[int, float]]:
         """(axis, place [m]) of the symmetry planes."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from distfsi.mesh.blocks import Snapshot
+
 AXES = "xyz"
 
 
@@ -22,7 +24,7 @@ class Accounts:
         momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
         self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
-        self._start: np.ndarray | None = None
+        self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
@@ -37,7 +39,7 @@ class Accounts:
             ]
         if coupling:
             self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
-        self.columns += [f"drift {name}" for name in self.conserved]
+        self.columns += [f"drift {name}" for name in self._names]
 
     def row(self, simulation) -> dict[str, float | int | str]:
         """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
@@ -75,16 +77,24 @@ class Accounts:
         if self.coupling:
             for cause, amounts in self.coupling.ledger().items():
                 book(f"ledger {cause}", amounts, -1.0)
-        if self._start is None:
+        if np.isnan(self._start).all():
             self._start = balance
         self._scale = np.maximum(self._scale, size)
         drift = (balance - self._start) / np.where(self._scale > 0.0, self._scale, 1.0)
-        return values | {f"drift {name}": d for name, d in zip(self.conserved, drift, strict=True)}
+        return values | {f"drift {name}": d for name, d in zip(self._names, drift, strict=True)}
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        return {"values": {"start": self._start, "scale": self._scale}}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._start, self._scale = snapshot["values"]["start"], snapshot["values"]["scale"]
 
     def summary(self, simulation) -> str:
         """One sentence on how well the books close; collective."""
         row = self.row(simulation)
-        worst = max(abs(row[f"drift {name}"]) for name in self.conserved)
+        worst = max(abs(row[f"drift {name}"]) for name in self._names)
         text = f"Books close to {worst:.1e}."
         if self.coupling:
             energy = sum(row[f"ledger {cause} energy [J]"] for cause in self.coupling.causes)

@@ -18,7 +18,7 @@ def chosen(name: str, meaning: str):
     def formula(*arguments):
         raise NotImplementedError(f"{name} ({meaning}) is chosen by the scene")
 
-    formula.__doc__ = meaning
+    formula.__name__, formula.__doc__ = name, meaning
     return formula
 
 
