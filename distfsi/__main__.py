@@ -3,39 +3,175 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from distfsi import __version__
 from distfsi.errors import DistfsiError, InputError
 
-COMMANDS = ("run", "check", "bench", "study")
+if TYPE_CHECKING:
+    from distfsi.mesh.communicator import Communicator
+
+STUDIES = ("steel_tube", "undex_2d", "shock_bubble", "shock_bubble_speed")  # modules of distfsi.study
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     main = argparse.ArgumentParser(prog="distfsi", description="Shock waves and blasts that hit structures.")
     main.add_argument("--version", action="version", version=__version__)
-    commands = main.add_subparsers(dest="command", required=True, metavar="{run,check,bench,study}")
-    for name, text in (
-        ("run", "run a scene (the command may be left out)"),
-        ("check", "check a scene and tell what it costs"),
-    ):
-        command = commands.add_parser(name, help=text)
+    commands = main.add_subparsers(dest="command", required=True, metavar="{" + ",".join(COMMANDS) + "}")
+    run = commands.add_parser("run", help="run a scene (the command may be left out)")
+    check = commands.add_parser("check", help="check a scene; tell what it costs and what it could do without")
+    for command in (run, check):
         command.add_argument("input", help="the scene, a TOML file")
-        command.add_argument(
-            "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the input"
-        )
-        if name == "run":
-            command.add_argument(
-                "--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)"
-            )
-    bench = commands.add_parser("bench", help="measure this machine's speed, as JSON")
+        _add_overrides(command)
+    run.add_argument("--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)")
+    run.add_argument(
+        "--restart",
+        metavar="auto|FILE",
+        help="go on from a restart file; auto: the newest in the output directory, else from the start",
+    )
+    check.add_argument("--ranks", type=_positive, default=1, help="MPI ranks of the run (default: 1)")
+    check.add_argument("--threads", type=_positive, help="threads per rank (default: cores of this machine / ranks)")
+    commands.add_parser("schema", help="print the JSON schema of the input, for editors")
+    plot = commands.add_parser("plot", help="draw the results of a run as PNG files")
+    _add_plot_options(plot)
+    info = commands.add_parser("info", help="tell what an output directory holds")
+    info.add_argument("directory", type=Path, help="output directory of a run")
+    bench = commands.add_parser("bench", help="measure this machine's speed, as JSON; check then knows times")
     bench.add_argument("--threads", type=int, help="threads per rank")
     bench.add_argument("--only", metavar="PART", help="only benchmarks whose name holds PART")
     study = commands.add_parser("study", help="compare with reference answers")
-    study.add_argument("name", choices=("steel_tube",), help="which study")
-    study.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the input")
+    study.add_argument("name", choices=STUDIES, help="which study: " + ", ".join(STUDIES))
+    _add_overrides(study)
     return main
+
+
+def _add_overrides(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the input")
+
+
+def _add_plot_options(plot: argparse.ArgumentParser) -> None:
+    plot.add_argument("directory", type=Path, help="output directory of a run")
+    plot.add_argument("--field", metavar="NAME", help="field of the cells (default: pressure)")
+    plot.add_argument("--particles", metavar="NAME", help="field that colors the particles")
+    times = plot.add_mutually_exclusive_group()
+    times.add_argument("--time", type=_seconds, metavar="T", help='only the frame nearest to it: 1e-5, "10 us"')
+    times.add_argument("--every", type=_positive, default=1, metavar="N", help="each N-th frame")
+    plot.add_argument("--slice", type=_plane, metavar="AXIS=PLACE", help='plane of a 3D run: z=0.1, "x=20 mm"')
+    plot.add_argument("--gauges", action="store_true", help="the gauges instead of fields and history")
+    plot.add_argument("--movie", action="store_true", help="the frames as an animated GIF, too")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text}; must be >= 1")
+    return number
+
+
+def _seconds(text: str) -> float:
+    return _quantity(text, "s")
+
+
+def _plane(text: str) -> tuple[int, float]:
+    axis, equals, place = text.partition("=")
+    if axis not in ("x", "y", "z") or not equals:
+        raise argparse.ArgumentTypeError(f"{text}; expected x=..., y=... or z=...")
+    return "xyz".index(axis), _quantity(place, "m")
+
+
+def _quantity(text: str, unit: str) -> float:
+    """A number in `unit`, or a text with its own unit."""
+    from distfsi.scene.units import to_si
+
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        return to_si(text, unit)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}' {error}") from error
+
+
+# ---- commands --------------------------------------------------------------------------------------------------------
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Run a scene."""
+    from distfsi import simulation
+    from distfsi.scene import load
+
+    communicator = _start_ranks()
+    with _telling_once(communicator):
+        scene = _load_once(load, arguments, communicator)
+        simulation.run(scene, communicator, arguments.threads, arguments.restart)
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Print what a scene costs."""
+    from distfsi.scene import load
+
+    scene = load(arguments.input, arguments.set)
+
+    from distfsi.study.bench import kept_bench
+    from distfsi.study.check import report
+
+    threads = arguments.threads or max(1, len(os.sched_getaffinity(0)) // arguments.ranks)
+    print(report(scene, arguments.ranks, threads, kept_bench()))
+
+
+def schema(arguments: argparse.Namespace) -> None:
+    """Print the JSON schema of the input."""
+    from distfsi.scene.reference import json_schema
+
+    print(json_schema(), end="")
+
+
+def plot(arguments: argparse.Namespace) -> None:
+    """Draw results."""
+    from distfsi.output.plot import plot
+
+    for path in plot(**{name: value for name, value in vars(arguments).items() if name != "command"}):
+        print(path)
+
+
+def info(arguments: argparse.Namespace) -> None:
+    """Print what an output directory holds."""
+    from distfsi.output.info import describe
+
+    print(describe(arguments.directory))
+
+
+def bench(arguments: argparse.Namespace) -> None:
+    """Measure this machine."""
+    from distfsi.study import bench
+
+    bench.main(_start_ranks(), arguments.threads, arguments.only)
+
+
+def study(arguments: argparse.Namespace) -> None:
+    """Compare with reference answers."""
+    module = import_module(f"distfsi.study.{arguments.name}")
+    communicator = _start_ranks()
+    with _telling_once(communicator):
+        module.main(communicator, arguments.set)
+
+
+COMMANDS = {
+    "run": run,
+    "check": check,
+    "schema": schema,
+    "plot": plot,
+    "info": info,
+    "bench": bench,
+    "study": study,
+}
 
 
 def main(words: list[str]) -> None:
@@ -43,33 +179,20 @@ def main(words: list[str]) -> None:
     if words and words[0] not in COMMANDS and not words[0].startswith("-"):
         words = ["run", *words]
     arguments = parser().parse_args(words)
-    if arguments.command == "check":
-        from distfsi.scene import load, report
+    COMMANDS[arguments.command](arguments)
 
-        print(report(load(arguments.input, arguments.set)))
-        return
+
+def _start_ranks() -> Communicator:
     from distfsi.mesh.communicator import Communicator, check_launcher, install_abort_on_exception
 
     communicator = Communicator()
     check_launcher(communicator)
     install_abort_on_exception(communicator)
-    if arguments.command == "run":
-        from distfsi import simulation
-        from distfsi.scene import load
-
-        simulation.run(_load_once(load, arguments, communicator), communicator, arguments.threads)
-    elif arguments.command == "bench":
-        from distfsi.study import bench
-
-        bench.main(communicator, arguments.threads, arguments.only)
-    else:
-        from distfsi.study import steel_tube
-
-        steel_tube.main(communicator, arguments.set)
+    return communicator
 
 
 def _load_once(load, arguments, communicator):
-    """The scene, read by rank 0 alone; its faults end all ranks, told once."""
+    """The scene, read by rank 0 alone; its faults are raised on all ranks."""
     scene, faults = None, None
     if communicator.rank == 0:
         try:
@@ -78,10 +201,19 @@ def _load_once(load, arguments, communicator):
             faults = error.faults
     scene, faults = communicator.broadcast((scene, faults))
     if faults:
-        if communicator.rank == 0:
-            print("\n".join(faults), file=sys.stderr, flush=True)
-        sys.exit(InputError.exit_code)
+        raise InputError(faults)
     return scene
+
+
+@contextmanager
+def _telling_once(communicator):
+    """An error that all ranks raise ends all of them, told by rank 0."""
+    try:
+        yield
+    except DistfsiError as error:
+        if communicator.rank == 0:
+            print(error, file=sys.stderr, flush=True)
+        sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":

@@ -5,18 +5,25 @@ A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import cached_property, singledispatch
 
 import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
-from distfsi.physics import euler, limiters, two_phase
+from distfsi.physics import euler, limiters, riemann, two_phase
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
 LIMITERS = {"first_order": limiters.first_order, "minmod": limiters.minmod, "van_leer": limiters.van_leer}
+RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
+    "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
+    "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
+    "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
+    "adaptive": (riemann.einfeldt_speeds, riemann.sharp, riemann.shear_along_shocks),
+}
 MODELS = {1: euler, 2: two_phase}
 
 
@@ -30,7 +37,11 @@ class FluidEos:
 
     def evaluate(self, rho: float) -> tuple[float, float]:
         """Reference pressure [Pa] and its slope with density, outside the kernels."""
-        return plain(self.reference.function, self.reference.constants)(rho)
+        return self._plain_reference(rho)
+
+    @cached_property
+    def _plain_reference(self) -> Callable[[float], tuple[float, float]]:
+        return plain(self.reference.function, self.reference.constants)
 
 
 @singledispatch
@@ -105,10 +116,13 @@ def fluid_model(scene: Scene) -> FluidModel:
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
+        "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
     model = MODELS[phases]
     names = ("primitives", "conserved", "face_flux", "updated", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
     bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
+    solver = zip(("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True)
+    bindings |= {name: Bound(function) for name, function in solver}
     bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
     return FluidModel(constants, bindings, eos, dimensions)

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import platform
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
 from threadpoolctl import threadpool_limits
 
 from distfsi.device.cpu import Team
-from distfsi.errors import Diverged
-from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.errors import Diverged, Stopped
+from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.model import fluid_model
-from distfsi.output.fields import FieldWriter
-from distfsi.output.history import History
+from distfsi.output.journal import Journal
 from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
-from distfsi.output.schedule import Every
+from distfsi.output.records import Records
+from distfsi.output.requests import Request, Requests
+from distfsi.output.restart import find_restart
+from distfsi.output.storage import on_root, prepare_directory, storage
 from distfsi.parts.accounts import Accounts
 from distfsi.parts.coupling import Coupling
-from distfsi.parts.fluid import SSP_RK3, Fluid
+from distfsi.parts.fluid import Fluid
+from distfsi.parts.gauges import Gauge, gauge_of
+from distfsi.parts.peaks import Peaks, schlieren
 from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
@@ -36,7 +43,7 @@ TimeStep = Callable[[], float]
 def fluid_step(fluid: Fluid, time_step: TimeStep) -> float:
     """Advance the fluid by one step and return it [s]."""
     dt = time_step()
-    for stage in SSP_RK3:  # paper, Eq. 16
+    for stage in fluid.stages:  # paper, Eq. 16
         fluid.advance_stage(stage, dt)  # MUSCL, HLLC, update and relaxation: Eqs. 11-30
     return dt
 
@@ -54,10 +61,10 @@ def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: Time
     """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
     solid.prepare(coupling.reach)
     coupling.classify()
-    for stage in SSP_RK3:
+    for stage in fluid.stages:
         fluid.exchange_ghosts(stage)
         coupling.fill(stage)  # Eqs. 31, 32
-        if stage is SSP_RK3[0]:
+        if stage is fluid.stages[0]:
             dt = time_step()
         fluid.advance_stage(stage, dt)
         coupling.collect_force(stage, dt)  # Eqs. 33, 35
@@ -69,7 +76,13 @@ def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: Time
 
 @dataclass
 class Simulation:
-    """The parts of a scene on this rank, and the step that advances them."""
+    """The parts of a scene on this rank, and the step that advances them.
+
+    watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
+              `snapshot()` and `restore(snapshot)`
+    asked     what this rank is asked for; looked at once in every step
+    request   the strongest of what all ranks were asked for in the last step: the same on all of them
+    """
 
     scene: Scene
     communicator: Communicator
@@ -77,10 +90,13 @@ class Simulation:
     fluid: Fluid | None
     solid: Solid | None
     coupling: Coupling | None
+    watchers: list[Peaks | Gauge] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
     dt: float = 0.0
     limited_by: str = "start"
+    asked: Callable[[], Request] = lambda: Request.NOTHING
+    request: Request = Request.NOTHING
 
     @classmethod
     def of(cls, scene: Scene, communicator: Communicator, threads: int | None = None) -> Simulation:
@@ -91,24 +107,39 @@ class Simulation:
         fluid = Fluid(scene, model, blocks, team) if scene.fluid else None
         solid = Solid(scene, blocks, communicator, team) if scene.solid else None
         coupling = Coupling(scene, model, fluid, solid, blocks, team) if fluid and solid else None
-        return cls(scene, communicator, blocks, fluid, solid, coupling)
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling)
+        if scene.output.peaks:
+            simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
+        simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
+        return simulation
 
     def step(self) -> None:
         """Advance everything by one step."""
         parts = [part for part in (self.fluid, self.solid, self.coupling) if part is not None]
         step = coupled_step if self.coupling else fluid_step if self.fluid else solid_step
-        self.dt = step(*parts, self.time_step)
+        try:
+            self.dt = step(*parts, self.time_step)
+        except Diverged as error:
+            faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
+            raise Diverged(faults[0]) from error
         self.time += self.dt
         self.steps += 1
+        self.watch()
+
+    def watch(self) -> None:
+        """Show the state to the watchers: once before the first step, then after each."""
+        for watcher in self.watchers:
+            watcher.after_step(self)
 
     def time_step(self) -> float:
         """The longest stable step [s] of all parts on all ranks. Raises Diverged when a part has no valid state."""
         signal = self.fluid.fastest_signal() if self.fluid else 0.0
         solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
-        rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt])
-        fluid_rate, solid_rate = self.communicator.maximum(rates)
+        rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, self.asked()])
+        fluid_rate, solid_rate, request = self.communicator.maximum(rates)
+        self.request = Request(int(request))
         if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
-            self._explain()
+            raise Diverged("there is no stable time step")
         if solid_rate > fluid_rate:
             holder = [
                 reason for rate, reason in self.communicator.allgather((rates[1], solid_reason)) if rate == solid_rate
@@ -122,16 +153,37 @@ class Simulation:
             self.limited_by = "end time"
         return min(dt, left)
 
-    def _explain(self) -> None:
-        """Raise Diverged with what the rank that sees it can tell."""
-        message = ""
+    def check(self) -> None:
+        """Collective. Raise Diverged on all ranks when the next step cannot start from the present state."""
+        faults = self._faults(self.coupling.covered if self.coupling else None)
+        if faults:
+            raise Diverged(faults[0])
+
+    def _faults(self, covered: np.ndarray | None = None) -> list[str]:
+        """Collective. What the ranks tell of invalid states; cells that are `covered` may hold anything."""
+        fault = ""
         try:
             if self.fluid:
-                self.fluid.check(self.time)
+                self.fluid.check(self.time, covered)
+            if self.solid:
+                self.solid.check(self.time)
         except Diverged as error:
-            message = str(error)
-        known = [text for text in self.communicator.allgather(message) if text]
-        raise Diverged(known[0] if known else f"the time step vanished at t = {self.time:.6g} s, step {self.steps}")
+            fault = str(error)
+        return [fault for fault in self.communicator.allgather(fault) if fault]
+
+    def kept(self) -> dict[str, Any]:
+        """All that a restart file keeps by snapshot() and brings back by restore(snapshot), by name."""
+        parts = {"simulation": self, "fluid": self.fluid, "solid": self.solid, "coupling": self.coupling}
+        present = {name: part for name, part in parts.items() if part is not None}
+        return present | {watcher.name: watcher for watcher in self.watchers}
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs besides the parts."""
+        return {"values": {"time": np.array(self.time), "steps": np.array(self.steps)}}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.time, self.steps = float(snapshot["values"]["time"]), int(snapshot["values"]["steps"])
 
     @property
     def done(self) -> bool:
@@ -142,6 +194,11 @@ class Simulation:
         """Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
+        for watcher in self.watchers:
+            if isinstance(watcher, Peaks):
+                cells |= watcher.outputs(covered)
+        if self.scene.output.schlieren:
+            cells["schlieren"] = schlieren(self.fluid, covered)
         return cells, self.solid.outputs() if self.solid else None
 
 
@@ -161,39 +218,69 @@ def deal_blocks(scene: Scene, communicator: Communicator) -> Blocks:
 
 
 def threads_of_rank(communicator: Communicator) -> int:
-    """Cores this process may use, shared with the other ranks of the node."""
-    return max(1, len(psutil.Process().cpu_affinity()) // communicator.local_size)
+    """Cores this process may use, shared with the other ranks of the node that may use the same."""
+    own = platform.node(), psutil.Process().cpu_affinity()
+    return max(1, len(own[1]) // communicator.allgather(own).count(own))
 
 
-def run(scene: Scene, communicator: Communicator, threads: int | None = None) -> Simulation:
-    """Run the scene to its end, writing fields, history and a picture into its output directory."""
+def run(scene: Scene, communicator: Communicator, threads: int | None = None, restart: str | None = None) -> Simulation:
+    """Run the scene to its end, writing fields, history, restart files and a picture into its output directory.
+
+    `restart`: a restart file to go on from, or "auto": the newest in the output directory; without one from the start.
+    Raises on all ranks: InputError for a restart file of another scene, OutputError, Diverged, and Stopped when a
+    signal, the stop file or the wall-clock limit has ended the run early.
+    """
     started = clock.perf_counter()
-    with threadpool_limits(1):
-        simulation = Simulation.of(scene, communicator, threads)
-    directory = Path(scene.output.directory)
-    writer = FieldWriter(directory, simulation.blocks, communicator)
-    accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
-    history = History(directory / "history.csv", accounts.columns, communicator)
+    directory, output = Path(scene.output.directory), scene.output
+    requests = Requests(output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
+    files = storage(output.hdf5, communicator)
+    origin = find_restart(restart, directory, scene, communicator)
+    prepare_directory(directory, communicator)
     progress = Progress(scene.time.end, communicator)
-    fields_due, frame = Every(scene.output.fields_every), 0
-
-    def record(always: bool = False) -> None:
-        nonlocal frame
-        if fields_due.due(simulation.time) or always:
-            writer.write(frame, simulation.time, *simulation.outputs())
-            frame += 1
-        if simulation.steps % scene.output.history_every == 0 or always:
-            history.append(accounts.row(simulation))
-
-    record()
-    while not simulation.done:
-        simulation.step()
-        record(always=simulation.done)
-        progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)
-    elapsed = clock.perf_counter() - started
-    progress.finish(
-        f"done: t = {simulation.time:.6g} s after {simulation.steps} steps in {elapsed:.1f} s. {accounts.summary(simulation)}"
+    threads = threads or threads_of_rank(communicator)
+    journal = Journal(directory, scene, communicator, threads)
+    with requests, closing(progress), threadpool_limits(1), journal:
+        simulation = Simulation.of(scene, communicator, threads)
+        simulation.asked = requests.strongest
+        accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
+        records = Records(simulation, accounts, files, origin)
+        kept = simulation.kept() | {"accounts": accounts, "records": records}
+        if origin:
+            origin.restore(kept, simulation.blocks, communicator)
+        else:
+            simulation.watch()
+            records.write()
+        advance(simulation, records, kept, requests, progress)
+    done = (
+        f"done: t = {simulation.time:.6g} s after {simulation.steps} steps in {clock.perf_counter() - started:.1f} s."
     )
+    fluid = simulation.fluid
+    rest = f" {100 * fluid.share_at_rest():.0f} % of the tile stages were at rest." if fluid else ""
+    progress.finish(f"{done} {accounts.summary(simulation)}{rest}")
+    picture = on_root(communicator, directory / "summary.png", lambda: draw_summary(directory))
     if communicator.rank == 0:
-        print(f"results in {directory}, picture in {draw_summary(directory)}", flush=True)
+        print(f"results in {directory}, picture in {picture}", flush=True)
     return simulation
+
+
+def advance(simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress) -> None:
+    """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped."""
+    while not simulation.done:
+        try:
+            simulation.step()
+            saving = simulation.request is not Request.NOTHING and not simulation.done
+            if saving:
+                simulation.check()
+        except Diverged as error:
+            records.write_fields()
+            raise Diverged(f"{error}\n{records.left_behind()}") from error
+        records.write(always=simulation.done)
+        progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)
+        if saving:
+            path = records.write_restart({name: part.snapshot() for name, part in kept.items()})
+            requests.saved()
+            if simulation.request.stops:
+                requests.remove_stop_file()
+                when = f"at t = {simulation.time:.6g} s after {simulation.steps} steps"
+                remedy = "the same command with --restart auto goes on"
+                raise Stopped(f"stopped {when} by {requests.words(simulation.request)}, state in {path}; {remedy}")

@@ -41,7 +41,7 @@ export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-timeout 120 mpiexec -n 2 python - "$scratch/test.h5" <<'PYTHON'
+cat > "$scratch/test.py" <<'PYTHON'
 import sys
 
 import h5py
@@ -57,4 +57,5 @@ with h5py.File(sys.argv[1], "w", driver="mpio", comm=ranks) as file:
 with h5py.File(sys.argv[1], "r", driver="mpio", comm=ranks) as file:
     assert list(file["ranks"]) == [0, 1]
 PYTHON
+timeout 60 mpiexec -n 2 python "$scratch/test.py" "$scratch/test.h5" || fail "two ranks could not write a file together"
 echo "Ready: h5py $(python -c 'import h5py; print(h5py.version.version, "on HDF5", h5py.version.hdf5_version)') writes in parallel"

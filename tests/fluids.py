@@ -15,9 +15,11 @@ PAIRS = tuple((a, b) for a in ("air", "water", "tnt") for b in ("helium", "water
 TRACE = 1e-6
 
 
-def model_of(*names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod") -> FluidModel:
+def model_of(
+    *names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod", riemann: str = "hllc"
+) -> FluidModel:
     """The model of a fluid made of `MATERIALS`."""
     phases = tuple(Phase(name, MATERIALS[name]) for name in names)
-    fluid = Fluid(phases, (), limiter, TRACE, (), "float64")
+    fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann)
     domain = SimpleNamespace(dimensions=dimensions)
     return fluid_model(SimpleNamespace(fluid=fluid, domain=domain, gravity=gravity or (0.0,) * dimensions))

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.mesh.blocks import Blocks, Grid
-from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.communicator import Communicator, check_launcher
 from distfsi.output.fields import FieldWriter
 from distfsi.output.history import History
+from distfsi.output.storage import storage
 
 # Cells, block cells, lower corner and upper corner of each scene; most last blocks are partly filled.
 SCENES = {
@@ -73,19 +74,21 @@ def ids_of_one_block(blocks: Blocks) -> np.ndarray:
     return np.flatnonzero(block == block[0])
 
 
-def main(directory: Path) -> None:
+def main(directory: Path, hdf5: str = "mpi-io") -> None:
     """Write all scenes, then the cases with few or no particles."""
     communicator = Communicator()
+    check_launcher(communicator)
+    files = storage(hdf5, communicator)
     for name, (cells, block_cells, lower, upper) in SCENES.items():
         grid = Grid.of(lower, upper, cells, (("wall", "wall"),) * len(cells))
         blocks = Blocks(grid, block_cells, communicator)
-        writer = FieldWriter(directory / name, blocks, communicator)
+        writer = FieldWriter(directory / name, blocks, communicator, files)
         for number, time in enumerate(TIMES):
             writer.write(10 * number, time, own_cells(blocks, time), own_particles(blocks, np.arange(200), time))
-    FieldWriter(directory / "no_particles", blocks, communicator).write(
+    FieldWriter(directory / "no_particles", blocks, communicator, files).write(
         0, 0.5, None, own_particles(blocks, np.arange(0), 0.5)
     )
-    FieldWriter(directory / "few_particles", blocks, communicator).write(
+    FieldWriter(directory / "few_particles", blocks, communicator, files).write(
         0, 0.5, None, own_particles(blocks, ids_of_one_block(blocks), 0.5)
     )
     history = History(directory / "history.csv", ["time [s]", "limited by"], communicator)
@@ -93,4 +96,4 @@ def main(directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

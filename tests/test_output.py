@@ -19,7 +19,7 @@ from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
 from distfsi.output.history import History, read_history
-from distfsi.output.panels import scaled
+from distfsi.output.scales import scaled
 from distfsi.output.picture import Figure, draw_summary
 from distfsi.output.schedule import Every
 

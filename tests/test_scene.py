@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from distfsi.errors import InputError
-from distfsi.scene import load, report, schema
+from distfsi.scene import load, schema
 from distfsi.scene.description import Ball, JohnsonCook, Jwl, NoStrength, StiffenedGas
 from distfsi.scene.reference import markdown
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
@@ -55,12 +55,9 @@ def faults(tmp_path):
 
 
 @pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
-def test_every_example_loads_and_reports(path):
+def test_every_example_loads(path):
     scene = load(path)
-    text = report(scene)
-    assert text.startswith(scene.title)
-    assert "steps" in text
-    assert "warning" not in text
+    assert scene.title
     assert scene.output.directory == f"out/{path.stem}"
 
 
@@ -79,24 +76,6 @@ def test_the_steel_tube_is_what_the_paper_says():
     assert scene.domain.boundaries == (("symmetry", "outflow"), ("symmetry", "outflow"))
     assert scene.time.end == 2e-5
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((128, 64), (128, 32))
-
-
-def test_report_counts_what_the_scene_holds():
-    text = report(load(TUBE))
-    assert "25,600 cells" in text
-    assert "6 block(s) of 128 x 64" in text
-    assert "16 particles, 8 cells" in text
-    assert "21 field outputs" in text
-
-
-def test_report_warns_of_what_looks_wrong():
-    changes = ["solid.bodies.tube.spacing=0.35 mm", "output.fields_every=1", "domain.cells=[160, 80]"]
-    text = report(load(TUBE, [*changes, "fluid.regions.1.phase=air", "fluid.regions.1.density=1"]))
-    for words in ("0.7 cells apart", "longer than the run", "2 times longer than wide", "'products' is nowhere"):
-        assert words in text
-    thin = report(load(TUBE, ["solid.bodies.tube.shape.inner_radius=0.0335"]))
-    assert "fewer than 4 particles" in thin
-    assert "thinner than sqrt(2) cells" in thin
 
 
 def test_three_dimensions_and_defaults(tmp_path, faults):
@@ -118,7 +97,6 @@ strength = { kind = "elastic", shear_modulus = "1 GPa" }
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((64, 32, 32), (64, 8, 8))
     assert scene.fluid.inflow == ((None, None),) * 3
     assert scene.solid.bodies[0].velocity == (0.0, 0.0, 0.0)
-    assert "one: 280 particles" in report(scene)
     shell = "solid.bodies.one.shape={kind='tube', center=[0.5, 0.5, 1], inner_radius=0.2, outer_radius=0.3}"
     expected = "a tube is packed in 2D only; not available yet in other dimensions"
     assert faults(text, shell) == [f"solid.bodies.one.shape (--set): {expected}"]
@@ -267,15 +245,15 @@ def test_faults_between_the_parts_of_a_fluid(faults, overrides, expected):
          ["solid.bodies.tube.spacing (--set): 0.0004 m is too coarse for the fluid cells; expected at most 0.000375 m, "
           "0.75 of the smallest cell; half a cell is better"]),
         (["solid.bodies.tube.shape.center=[1, 1]"],
-         ["solid.bodies.tube.shape (line 50): reaches beyond the high x end of the domain, which is 'outflow'; "
+         ["solid.bodies.tube.shape (line {tube}): reaches beyond the high x end of the domain, which is 'outflow'; "
           "only 'symmetry' may cut a body",
-          "solid.bodies.tube.shape (line 50): reaches beyond the high y end of the domain, which is 'outflow'; "
+          "solid.bodies.tube.shape (line {tube}): reaches beyond the high y end of the domain, which is 'outflow'; "
           "only 'symmetry' may cut a body",
-          "solid.bodies.tube.shape (line 50): no particle of it lies inside the domain"]),
+          "solid.bodies.tube.shape (line {tube}): no particle of it lies inside the domain"]),
         (["solid.bodies.tube.shape.inner_radius=35 mm"],
-         ["solid.bodies.tube.shape (line 50): inner_radius must be smaller than outer_radius"]),
+         ["solid.bodies.tube.shape (line {tube}): inner_radius must be smaller than outer_radius"]),
         (["solid.bodies.tube.strength.melt_temperature=200"],
-         ["solid.bodies.tube.strength (line 55): melt_temperature must be above room_temperature"]),
+         ["solid.bodies.tube.strength (line {strength}): melt_temperature must be above room_temperature"]),
         (["fluid.regions.1.energy=0.4 MJ/kg"],
          ["fluid.regions.1.energy (--set): too low: at this density 'products' has a sound speed only above "
           "1.66677e+06 J/kg"]),
@@ -284,7 +262,12 @@ def test_faults_between_the_parts_of_a_fluid(faults, overrides, expected):
 def test_faults_between_fluid_and_solid(overrides, expected):
     with pytest.raises(InputError) as caught:
         load(TUBE, overrides)
-    assert caught.value.faults == ["steel_tube.toml: " + line for line in expected]
+    text = TUBE.read_text().splitlines()
+    lines = {
+        "tube": text.index("[solid.bodies.tube]") + 2,
+        "strength": next(n for n, line in enumerate(text, 1) if line.startswith("[solid.bodies.tube.strength]")),
+    }
+    assert caught.value.faults == ["steel_tube.toml: " + line.format(**lines) for line in expected]
 
 
 def test_overlapping_bodies_are_a_fault():
@@ -292,7 +275,7 @@ def test_overlapping_bodies_are_a_fault():
     for lower in ("-1 mm", "-0.03 mm"):  # deep inside the other plate; closer than two particles can be
         with pytest.raises(InputError) as caught:
             load(impact, [f"solid.bodies.right.shape.lower={lower}"])
-        assert "solid.bodies.right.shape (line 27): overlaps body 'left'" in str(caught.value)
+        assert ": overlaps body 'left'" in str(caught.value)
     assert load(impact, ["solid.bodies.right.shape.lower=0.01 mm"])
 
 

@@ -10,14 +10,14 @@ from fluids import model_of
 from llvmlite.binding import get_host_cpu_features
 
 from distfsi.device import emit, runtime
-from distfsi.kernels import fluid
+from distfsi.kernels import fluid, peaks
 
 pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"
 )
 
-ROWS = (fluid.primitives_row, fluid.slopes_row, fluid.flux_row, fluid.update_row, fluid.signal_row)
-REALS = ("cx", "cy", "cz", "b", "dt", "rx", "ry", "rz")
+ROWS = (fluid.primitives_row, fluid.slopes_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
+REALS = ("cx", "cy", "cz", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),
@@ -38,7 +38,11 @@ def machine_code(row, text, real):
     module = {}
     exec(text, module)
     arguments = [
-        np.zeros(1, real) if name.isupper() or name.startswith("U_") else np.dtype(real).type(0) if name in REALS else 0
+        np.zeros(1, np.uint8 if name == "K" else real)
+        if name.isupper() or name.startswith("U_")
+        else np.dtype(real).type(0)
+        if name in REALS
+        else 0
         for name in inspect.signature(row).parameters
     ]
     module[row.__name__](*arguments)  # of no cells

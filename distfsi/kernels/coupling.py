@@ -12,11 +12,14 @@ from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
 from distfsi.kernels.gather import any_particle, sum_particles
 from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
+from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, conserved, primitives
 from distfsi.physics.tensors import dot
 
 # What a cell is: fluid; fluid since this step; not yet looked at; behind the wall; farther behind than fluxes look.
 FLUID, FRESH, UNKNOWN, COVERED, DEEP = range(5)
+
+# Cells that give the flux through one face: its line of four is the middle one of five.
+BOX, LINE = 20, 8
 
 # ---- places ---------------------------------------------------------------------------------------------------------
 
@@ -203,13 +206,23 @@ def fill_deep(begin, end, deep, U, shape, rest):
 
 
 @helper
-def add_flux(passed, n, U, at, cells, step, axis, weight, P, T, F):
-    """passed[n] += weight * flux through the face between the cells `at` and `at + step`, by the rows of the stage."""
-    first = at + at // cells * (VARIABLES - 1) * cells
+def add_flux(passed, n, U, at, cells, steps, axis, weight, P, T, F):
+    """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`, by the rows of the
+    stage.
+
+    P holds five lines of four cells: the one through the face, and those beside it if the flux looks there.
+    """
+    first, step = at + at // cells * (VARIABLES - 1) * cells, steps[axis]
     for c in range(4):
-        primitives_row(U, P, first + (c - 1) * step, cells, c, 4, 1)
-    slopes_row(P, T, 1, 4, 1, 0, 2, 2)
-    flux_row(P, T, F, 1, 4, 1, 0, 1, 2, 0, axis, 1)
+        primitives_row(U, P, first + (c - 1) * step, cells, LINE + c, BOX, 1)
+    if LOOKS_SIDEWAYS:
+        for d in range(1, DIMENSIONS):
+            beside = steps[(axis + d) % DIMENSIONS]
+            for c in range(1, 3):
+                primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
+                primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
+    slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
+    flux_row(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, 1)
     for v in range(PHASES + DIMENSIONS + 1):
         passed[n, v] += weight * load(F, 2 * place(v, axis))
 
@@ -221,28 +234,28 @@ def collect_wall(begin, end, covered, passed, U, kind, shape, steps, weights):
     weights (D,): share of the stage * dt * area of a face.
     """
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(4 * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
     for n in range(begin, end):
         at = covered[n]
         for axis in range(DIMENSIONS):
             step = steps[axis]
             if kind[at - step] < COVERED:
-                add_flux(passed, n, U, at - step, cells, step, axis, weights[axis], P, T, F)
+                add_flux(passed, n, U, at - step, cells, steps, axis, weights[axis], P, T, F)
             if kind[at + step] < COVERED:
-                add_flux(passed, n, U, at, cells, step, axis, -weights[axis], P, T, F)
+                add_flux(passed, n, U, at, cells, steps, axis, -weights[axis], P, T, F)
 
 
 @driver
 def collect_sides(begin, end, side_cells, side, passed, U, kind, shape, steps, weights):
     """passed[n] grows by what leaves through a domain's side, side[n] = 2 axis + (0 low, 1 high), at a covered cell."""
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(4 * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
     for n in range(begin, end):
         at, axis = side_cells[n], side[n] // 2
         if kind[at] >= COVERED:
             high = side[n] % 2
             before = at if high == 1 else at - steps[axis]
-            add_flux(passed, n, U, before, cells, steps[axis], axis, (2 * high - 1) * weights[axis], P, T, F)
+            add_flux(passed, n, U, before, cells, steps, axis, (2 * high - 1) * weights[axis], P, T, F)
 
 
 @driver

@@ -6,6 +6,8 @@ A tile is computed row by row (x fastest), so that its working set stays in the 
     for each row:  slopes and fluxes along x; along y and z those of the row above roll forward
                    divergence, Runge-Kutta update and relaxation -> U_new
 
+Where all cells that a tile reads hold the same state, all its cells get the same bits: it is computed as one cell.
+
 P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes hold px values per variable. Flux rows
 have their velocity components rotated so that the normal one comes first.
 """
@@ -15,6 +17,7 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
     FLUXES,
+    LOOKS_SIDEWAYS,
     PHASES,
     VARIABLES,
     face_flux,
@@ -64,9 +67,27 @@ def slopes_row(P, T, p, sp, step, t, st, n):
             store(T, t + v * st + i, 0.5 * limited_slope(here - load(P, c - step), load(P, c + step) - here))
 
 
+@helper
+def largest_jump(P, c, side):
+    """The larger pressure difference between a cell and its neighbours `side` away, whose pressures are around P[c]."""
+    return max(abs(load(P, c + side) - load(P, c)), abs(load(P, c) - load(P, c - side)))
+
+
+@helper
+def jump_along_face(P, c, step, side_1, side_2):
+    """The largest pressure difference [Pa] between the face's two cells, c and c + step, and those beside them."""
+    jump = max(largest_jump(P, c, side_1), largest_jump(P, c + step, side_1))
+    if DIMENSIONS > 2:
+        jump = max(jump, max(largest_jump(P, c, side_2), largest_jump(P, c + step, side_2)))
+    return jump
+
+
 @row
-def flux_row(P, T, F, p, sp, step, t_low, t_high, st, f, axis, n):
-    """F[f …] = flux through the faces between the n cells at P[p …] and those `step` further along `axis`."""
+def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, n):
+    """F[f …] = flux through the faces between the n cells at P[p …] and those `step` further along `axis`.
+
+    Along the other axes neighbours are side_1 and side_2 apart.
+    """
     for i in range(n):
         left = tuple(
             load(P, p + rotated(v, axis) * sp + i) + load(T, t_low + rotated(v, axis) * st + i)
@@ -76,7 +97,9 @@ def flux_row(P, T, F, p, sp, step, t_low, t_high, st, f, axis, n):
             load(P, p + step + rotated(v, axis) * sp + i) - load(T, t_high + rotated(v, axis) * st + i)
             for v in static_range(VARIABLES)
         )
-        flux = face_flux(left, right)
+        pressures = p + (PHASES + DIMENSIONS) * sp + i
+        jump = jump_along_face(P, pressures, step, side_1, side_2) if LOOKS_SIDEWAYS else 0.0
+        flux = face_flux(left, right, jump)
         for v in static_range(FLUXES):
             store(F, f + v * st + i, flux[v])
 
@@ -112,20 +135,66 @@ def update_row(U_n, U, P, F, U_new, u, su, p, sp, st, fx, fy_low, fy_high, fz_lo
             store(U_new, u + v * su + i, new[v])
 
 
+@row
+def count_unlike(U, u, first, su, n):
+    """How many values of the n cells at U[u …] differ from those of the cell at `first`; a NaN differs from all."""
+    count = 0
+    for v in static_range(VARIABLES):
+        value = load(U, first + v * su)
+        for i in range(n):
+            count += 1 if load(U, u + v * su + i) != value else 0
+    return count
+
+
 @helper
-def book(through, t, side, F, f, st, axis, n, weight):
-    """Add the flux through n faces of a domain side to what has left through it."""
+def is_uniform(U, u, su, sz, sy, n, m, l):
+    """Whether the box of n x m x l cells at U[u …] holds one state."""
+    for k in range(l):
+        for j in range(m):
+            if count_unlike(U, u + k * sz + j * sy, u, su, n) > 0:
+                return False
+    return True
+
+
+@row
+def repeat_row(U, u, first, su, n):
+    """The n cells at U[u …] get the values of the cell at `first`."""
+    for v in static_range(VARIABLES):
+        value = load(U, first + v * su)
+        for i in range(n):
+            store(U, u + v * su + i, value)
+
+
+@helper
+def is_unchanged(U_n, U, U_new, u, su):
+    """Whether a cell has the same values in all three states."""
+    unchanged = True
+    for v in static_range(VARIABLES):
+        value = load(U_new, u + v * su)
+        unchanged = unchanged and load(U, u + v * su) == value and load(U_n, u + v * su) == value
+    return unchanged
+
+
+@helper
+def book(through, t, side, F, f, step, st, axis, n, rows, weight):
+    """Add the flux through n faces of a domain side, `step` apart, to what has left through it; and that of as many
+    `rows` as are alike."""
     for v in static_range(PHASES + DIMENSIONS + 1):
         total = load(F, f + place(v, axis) * st)
         for i in range(1, n):
-            total = total + load(F, f + place(v, axis) * st + i)
-        through[t, side, v] += total * weight
+            total = total + load(F, f + place(v, axis) * st + i * step)
+        for _ in range(rows):
+            through[t, side, v] += total * weight
 
 
 @driver
-def advance_tiles(begin, end, chosen, tiles, U_n, U, U_new, through, b, dt, weight, cx, cy, cz, px, py, pz):
+def advance_tiles(
+    begin, end, chosen, tiles, calm, stages, U_n, U, U_new, through, b, dt, weight, cx, cy, cz, px, py, pz
+):  # fmt: skip
     """One Runge-Kutta stage of the tiles chosen[begin:end].
 
+    calm (tiles,): which tiles are known to stay as they are, in U_new too; only their flux is booked.
+    stages (tiles + 1,): for how many stages each tile has not changed; counted here.
     U_n, U, U_new: (blocks, VARIABLES, Z, Y, X), the state before the step, of this stage and after it; U_n may be U.
     through (tiles, 6, conserved): grows by weight * dt/h * flux at the domain's sides. cx, cy, cz: dt/h per axis.
     """
@@ -141,11 +210,18 @@ def advance_tiles(begin, end, chosen, tiles, U_n, U, U_new, through, b, dt, weig
     F = workspace((3 + 2 * py) * fluxes)
     for at in range(begin, end):
         t = chosen[at]
-        n, m, l, sides = tiles[t, NX], tiles[t, NY], tiles[t, NZ], tiles[t, SIDES]
+        nx, ny, nz, sides = tiles[t, NX], tiles[t, NY], tiles[t, NZ], tiles[t, SIDES]
         u0 = tiles[t, BLOCK] * VARIABLES * su + tiles[t, Z0] * sz + tiles[t, Y0] * sy + tiles[t, X0]
+        uniform = calm[t] or (
+            is_uniform(U, u0 - gz * sz - gy * sy - 2, su, sz, sy, nx + 4, ny + 2 * gy, nz + 2 * gz)
+            and is_uniform(U_n, u0, su, sz, sy, nx, ny, nz)
+        )
+        n, m, l, step = (1, 1, 1, 0) if uniform else (nx, ny, nz, 1)
+        x_alike, y_alike, z_alike = (ny * nz, nz, ny) if uniform else (1, 1, 1)
         for k in range(-gz, l + gz):
             for j in range(-gy, m + gy):
-                if (j >= 0 and j < m) or (k >= 0 and k < l):
+                beside = LOOKS_SIDEWAYS and j >= -1 and j <= m and k >= -1 and k <= l
+                if (j >= 0 and j < m) or (k >= 0 and k < l) or beside:
                     primitives_row(U, P, u0 + k * sz + j * sy - 2, su, ((k + gz) * py + j + gy) * px, sp, n + 4)
         tx, fx = 0, 0
         ty, ty_next = slopes, 2 * slopes
@@ -156,45 +232,49 @@ def advance_tiles(begin, end, chosen, tiles, U_n, U, U_new, through, b, dt, weig
                 tz, tz_next, fz = (3 + j) * slopes, (3 + py + j) * slopes, (3 + j) * fluxes
                 slopes_row(P, T, c - px * py, sp, px * py, tz_next, px, n)
                 slopes_row(P, T, c, sp, px * py, tz, px, n)
-                flux_row(P, T, F, c - px * py, sp, px * py, tz_next, tz, px, fz, 2, n)
+                flux_row(P, T, F, c - px * py, sp, px * py, 1, px, tz_next, tz, px, fz, 2, n)
                 if sides & 16:
-                    book(through, t, 4, F, fz, px, 2, n, weight * cz)
+                    book(through, t, 4, F, fz, step, px, 2, nx, z_alike, weight * cz)
         for k in range(l):
             now, then = (3 + py * (k % 2)), (3 + py * ((k + 1) % 2))
             if DIMENSIONS > 1:
                 c = ((k + gz) * py + gy) * px + 2
                 slopes_row(P, T, c - px, sp, px, ty_next, px, n)
                 slopes_row(P, T, c, sp, px, ty, px, n)
-                flux_row(P, T, F, c - px, sp, px, ty_next, ty, px, fy, 1, n)
+                flux_row(P, T, F, c - px, sp, px, 1, px * py, ty_next, ty, px, fy, 1, n)
                 if sides & 4:
-                    book(through, t, 2, F, fy, px, 1, n, weight * cy)
+                    book(through, t, 2, F, fy, step, px, 1, nx, y_alike, weight * cy)
             for j in range(m):
                 c = ((k + gz) * py + j + gy) * px + 2
                 slopes_row(P, T, c - 1, sp, 1, tx, px, n + 2)
-                flux_row(P, T, F, c - 1, sp, 1, tx, tx + 1, px, fx, 0, n + 1)
+                flux_row(P, T, F, c - 1, sp, 1, px, px * py, tx, tx + 1, px, fx, 0, n + 1)
                 if DIMENSIONS > 1:
                     slopes_row(P, T, c + px, sp, px, ty_next, px, n)
-                    flux_row(P, T, F, c, sp, px, ty, ty_next, px, fy_next, 1, n)
+                    flux_row(P, T, F, c, sp, px, 1, px * py, ty, ty_next, px, fy_next, 1, n)
                 if DIMENSIONS > 2:
-                    slopes_row(P, T, c + px * py, sp, px * py, (then + j) * slopes, px, n)
-                    flux_row(
-                        P, T, F, c, sp, px * py, (now + j) * slopes, (then + j) * slopes, px, (then + j) * fluxes, 2, n
-                    )
+                    tz, tz_next, fz = (now + j) * slopes, (then + j) * slopes, (then + j) * fluxes
+                    slopes_row(P, T, c + px * py, sp, px * py, tz_next, px, n)
+                    flux_row(P, T, F, c, sp, px * py, 1, px, tz, tz_next, px, fz, 2, n)
                 u = u0 + k * sz + j * sy
                 fz_low, fz_high = (now + j) * fluxes, (then + j) * fluxes
                 update_row(
                     U_n, U, P, F, U_new, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high, cx, cy, cz, b, dt, n
                 )
                 if sides & 1:
-                    book(through, t, 0, F, fx, px, 0, 1, weight * cx)
+                    book(through, t, 0, F, fx, step, px, 0, 1, x_alike, weight * cx)
                 if sides & 2:
-                    book(through, t, 1, F, fx + n, px, 0, 1, weight * cx)
+                    book(through, t, 1, F, fx + n, step, px, 0, 1, x_alike, weight * cx)
                 if DIMENSIONS > 1 and sides & 8 and j == m - 1:
-                    book(through, t, 3, F, fy_next, px, 1, n, weight * cy)
+                    book(through, t, 3, F, fy_next, step, px, 1, nx, y_alike, weight * cy)
                 if DIMENSIONS > 2 and sides & 32 and k == l - 1:
-                    book(through, t, 5, F, fz_high, px, 2, n, weight * cz)
+                    book(through, t, 5, F, fz_high, step, px, 2, nx, z_alike, weight * cz)
                 ty, ty_next = ty_next, ty
                 fy, fy_next = fy_next, fy
+        if uniform and not calm[t]:
+            for k in range(nz):
+                for j in range(ny):
+                    repeat_row(U_new, u0 + k * sz + j * sy, u0, su, nx)
+        stages[t] = stages[t] + 1 if uniform and is_unchanged(U_n, U, U_new, u0, su) else 0
 
 
 @row
@@ -214,8 +294,9 @@ def signal_row(U, S, u, su, n, rx, ry, rz):
 
 
 @driver
-def fastest_signals(begin, end, U, start, extent, rx, ry, rz, fastest):
-    """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s]; NaN when a cell is not finite.
+def fastest_signals(begin, end, chosen, U, start, extent, rx, ry, rz, fastest):
+    """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s] for the blocks chosen[begin:end]; NaN when a
+    cell is not finite.
 
     start: index of a block's first active cell within one variable; rx, ry, rz: 1/h.
     """
@@ -223,7 +304,8 @@ def fastest_signals(begin, end, U, start, extent, rx, ry, rz, fastest):
     sz = sy * U.shape[3]
     su = sz * U.shape[2]
     S = workspace(2 * sy)
-    for block in range(begin, end):
+    for at in range(begin, end):
+        block = chosen[at]
         n = extent[block, 0]
         for i in range(2 * n):
             S[i] = 0.0

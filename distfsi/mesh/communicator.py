@@ -8,6 +8,7 @@ import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -25,6 +26,8 @@ class Communicator:
     """
 
     def __init__(self) -> None:
+        if not MPI.Is_initialized():
+            MPI.Init_thread()
         self.world = MPI.COMM_WORLD
         self.rank = self.world.Get_rank()
         self.size = self.world.Get_size()
@@ -105,8 +108,8 @@ def _noting(failures: list[str]) -> Iterator[None]:
     try:
         yield
     except MPI.Exception as error:
-        # The last line of an error stack is the cause.
-        failures.append(error.Get_error_string().splitlines()[-1].split(": ")[-1])
+        # The end of an error stack is the cause, after words that say nothing.
+        failures.append(error.Get_error_string().splitlines()[-1].split(": ")[-1].removeprefix("Other I/O error "))
     except OSError as error:
         failures.append(str(error))
 
@@ -140,5 +143,6 @@ def check_launcher(communicator: Communicator) -> None:
         started = int(os.environ.get(name, 1))
         if started > 1:
             fault = f"the launcher started {started} ranks ({name}), but each runs alone with {communicator.library}"
-            remedy = f"use the mpiexec that belongs to this library, or the one in {sys.prefix}/bin"
+            own = Path(sys.prefix, "bin", "mpiexec")
+            remedy = "use the mpiexec that belongs to this library" + (f": {own}" if own.exists() else "")
             raise InputError([f"{fault}: launcher and MPI library do not match; {remedy}"])

@@ -93,9 +93,9 @@ class ParticleExchange:
 
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
         at the ends of the grid extend to infinity. Particles and ghosts within `reach` of symmetry planes have images.
-        `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`, on
-        all ranks or none, holds ids of particles that this rank needs as ghosts wherever they are.
-        Raises InputError when a particle could have two images along one axis.
+        `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`,
+        on all ranks or none, holds ids of particles that this rank needs as ghosts wherever they are. Raises InputError
+        when a particle could have two images along one axis.
         """
         own = len(id)
         planes = self._planes(reach)

@@ -1,10 +1,8 @@
 """Field files: cells and particles of one time each, as VTKHDF that ParaView opens, written by all ranks at once.
 
-Rank 0 lays down an ordinary HDF5 file whose datasets have their final place on disk, and tells every rank the byte
-offsets; all ranks then write their raw values there through MPI-IO. Cells are chunked with one chunk per block, so that
-a block is one piece of the file. A file is renamed to its final name when it is complete and on disk, and only then is
-it listed in `cells.vtkhdf.series` or `particles.vtkhdf.series` (ParaView's index of the times): whatever is listed is
-readable, whenever the run dies.
+Cells are chunked with one chunk per block, so that a block is one piece of the file. A file is renamed to its final
+name when it is complete and on disk, and only then is it listed in `cells.vtkhdf.series` or `particles.vtkhdf.series`
+(ParaView's index of the times): whatever is listed is readable, whenever the run dies.
 
 Format: VTKHDF 2.0, docs.vtk.org, "VTK file formats".
 """
@@ -12,30 +10,42 @@ Format: VTKHDF 2.0, docs.vtk.org, "VTK file formats".
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from distfsi.output.interfaces import Blocks, Communicator, Grid
+from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_root, replace, write_complete
 
 KINDS = ("cells", "particles")
 
+Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype]]  # of one cell's or particle's value, and its type, by name
+Fill = Callable[[h5py.File, float], Mapping[str, h5py.Dataset]]
+
 
 class FieldWriter:
-    """Writes the field files of a new run into `directory`; those of an earlier run there are removed."""
+    """Writes the field files of a run into `directory`.
 
-    def __init__(self, directory: Path, blocks: Blocks, communicator: Communicator):
+    Those of an earlier run there are removed; at a restart, which goes on with them, only those after `until` [s].
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        blocks: Blocks,
+        communicator: Communicator,
+        storage: Storage | None = None,
+        until: float | None = None,
+    ):
+        """Collective. `storage` None: MPI-IO. Raises OutputError on all ranks."""
         self._directory = Path(directory)
         self._blocks = blocks
         self._communicator = communicator
-        self._times: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
-        if communicator.rank == 0:
-            self._directory.mkdir(parents=True, exist_ok=True)
-            for kind in KINDS:
-                _remove_series(self._directory, kind)
+        self._storage = storage or MpiIo(communicator)
+        self._times = on_root(communicator, self._directory, lambda: _keep_until(self._directory, until))
 
     def write(
         self,
@@ -48,48 +58,39 @@ class FieldWriter:
 
         `cells`: own blocks without ghosts, (blocks, bz, by, bx) or (blocks, bz, by, bx, 3); what lies beyond the last
         active cell of a partly filled block is not part of the file. `particles`: own rows, (n,) or (n, 3), among them
-        "position" (n, 3); the file holds the rows of rank 0, 1, ... None: the scene has no such thing.
+        "position" (n, 3); the file holds the rows of rank 0, 1, ... None: the scene has no such thing. Raises
+        OutputError on all ranks.
         """
         if cells is not None:
-            self._publish("cells", number, time, self._write_cells, cells)
+            self._publish("cells", number, time, *self._lay_out_cells(cells))
         if particles is not None:
-            self._publish("particles", number, time, self._write_particles, particles)
+            self._publish("particles", number, time, *self._lay_out_particles(particles))
 
-    def _publish(
-        self,
-        kind: str,
-        number: int,
-        time: float,
-        write: Callable[[Path, float, Mapping[str, np.ndarray]], None],
-        arrays: Mapping[str, np.ndarray],
-    ) -> None:
+    def _publish(self, kind: str, number: int, time: float, fill: Fill, pieces: Sequence[Piece]) -> None:
         """Write a file under a temporary name; make it visible, then listed, once it is complete."""
         path = self._directory / f"{kind}-{number:06d}.vtkhdf"
-        temporary = path.with_name(path.name + ".tmp")
-        write(temporary, time, arrays)
-        if self._communicator.rank == 0:
-            _replace(temporary, path)
-            self._times[kind][path.name] = float(time)
-            _write_series(self._directory, kind, self._times[kind])
+        times = self._times[kind]
+        write_complete(self._storage, self._communicator, path, lambda file: fill(file, time), pieces)
+        times[path.name] = float(time)
+        on_root(self._communicator, path, lambda: _write_series(self._directory, kind, times))
 
-    def _write_cells(self, path: Path, time: float, cells: Mapping[str, np.ndarray]) -> None:
-        grid = self._blocks.grid
-        chunk = self._blocks.block_cells[::-1]
-        offsets = None
-        if self._communicator.rank == 0:
-            offsets = _create_cells(path, time, grid, chunk, cells)
-        offsets = self._communicator.broadcast(offsets)
-        own = self._blocks.origin[:, ::-1] // chunk
-        self._write_pieces(
-            path,
-            [
-                (offsets[name][tuple(index)], block)
-                for name, array in cells.items()
-                for index, block in zip(own, array, strict=True)
-            ],
-        )
+    def _lay_out_cells(self, cells: Mapping[str, np.ndarray]) -> tuple[Fill, list[Piece]]:
+        """How to fill a cells file, and this rank's pieces of it: its blocks.
 
-    def _write_particles(self, path: Path, time: float, particles: Mapping[str, np.ndarray]) -> None:
+        Unused axes are left out of the datasets and have no extent: VTK then shows a line or a flat image.
+        """
+        grid, used = self._blocks.grid, slice(3 - self._blocks.grid.dimensions, 3)
+        chunk = self._blocks.block_cells[::-1][used]
+        shapes = {name: (array.shape[4:], array.dtype) for name, array in cells.items()}
+        pieces = [
+            (name, (*origin[::-1][used], *(0,) * len(block.shape[3:])), block.reshape(*chunk, *block.shape[3:]))
+            for name, array in cells.items()
+            for origin, block in zip(self._blocks.origin, array, strict=True)
+        ]
+        return partial(_fill_cells, grid, chunk, shapes), pieces
+
+    def _lay_out_particles(self, particles: Mapping[str, np.ndarray]) -> tuple[Fill, list[Piece]]:
+        """How to fill a particles file, and this rank's pieces of it: a run of rows of each column."""
         rank = self._communicator.rank
         counts = self._communicator.allgather(len(particles["position"]))
         start, stop = sum(counts[:rank]), sum(counts[: rank + 1])
@@ -97,23 +98,9 @@ class FieldWriter:
         columns["Vertices/Connectivity"] = (start, np.arange(start, stop))
         first = start + 1 if rank else 0  # one more end than vertices: rank 0 writes the leading zero
         columns["Vertices/Offsets"] = (first, np.arange(first, stop + 1))
-        offsets = None
-        if rank == 0:
-            offsets = _create_particles(path, time, sum(counts), {name: rows for name, (_, rows) in columns.items()})
-        offsets = self._communicator.broadcast(offsets)
-        self._write_pieces(
-            path,
-            [
-                (offsets[name] + row * (array.nbytes // len(array)), array)
-                for name, (row, array) in columns.items()
-                if len(array)
-            ],
-        )
-
-    def _write_pieces(self, path: Path, pieces: Sequence[tuple[int, np.ndarray]]) -> None:
-        self._communicator.write_at(
-            path, [int(offset) for offset, _ in pieces], [np.ascontiguousarray(array) for _, array in pieces]
-        )
+        shapes = {name: (array.shape[1:], array.dtype) for name, (_, array) in columns.items()}
+        pieces = [(name, (row, *(0,) * (array.ndim - 1)), array) for name, (row, array) in columns.items()]
+        return partial(_fill_particles, sum(counts), shapes), pieces
 
 
 def series(directory: Path, kind: str) -> list[tuple[float, Path]]:
@@ -135,6 +122,53 @@ def read_cells(path: Path) -> tuple[float, dict[str, np.ndarray], np.ndarray, np
         return _read_time(root), fields, root.attrs["Origin"], root.attrs["Spacing"]
 
 
+def read_layer(
+    path: Path, normal: int, place: float | None = None, names: Sequence[str] | None = None
+) -> tuple[float, dict[str, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Time [s], fields (nv, nh) or (nv, nh, 3) and corners, low and high (3,) [m], of a layer of cells of a cells file.
+
+    It is the one that the plane normal to axis `normal` at `place` [m] (None: the middle) passes through; nh cells
+    along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all. Raises
+    ValueError when the plane passes by or there is nothing to cut, KeyError when there is no such field.
+    """
+    with h5py.File(path) as file:
+        root = file["VTKHDF"]
+        cells = np.maximum(root.attrs["WholeExtent"][1::2], 1)
+        low, spacing = root.attrs["Origin"], root.attrs["Spacing"]
+        dimensions = np.count_nonzero(root.attrs["WholeExtent"][1::2])
+        if place is not None and dimensions < 3:
+            raise ValueError("only three dimensions can be cut")
+        layer = cells[normal] // 2 if place is None else int(np.floor((place - low[normal]) / spacing[normal]))
+        if not 0 <= layer < cells[normal]:
+            raise ValueError(f"the plane at {place:g} m lies outside of the domain along {'xyz'[normal]}")
+        chosen = [slice(None)] * 3
+        chosen[2 - normal] = layer
+        shape = [cells[axis] for axis in (2, 1, 0) if axis != normal]
+        data = root["CellData"]
+        fields = {
+            name: data[name][tuple(chosen[3 - dimensions :])].reshape(*shape, *data[name].shape[dimensions:])
+            for name in (names if names is not None else data)
+        }
+        high = low + np.where(np.arange(3) < dimensions, cells * spacing, 0.0)
+        low[normal] += layer * spacing[normal] * (normal < dimensions)
+        high[normal] = low[normal] + spacing[normal] * (normal < dimensions)
+        return _read_time(root), fields, (low, high)
+
+
+def axis_across(path: Path) -> int:
+    """The axis across the only layer of a cells file; z if it has several."""
+    with h5py.File(path) as file:
+        cells = np.maximum(file["VTKHDF"].attrs["WholeExtent"][1::2], 1)
+        return 2 if cells[2] == 1 or cells.min() > 1 else int(np.argmin(cells))
+
+
+def field_names(path: Path) -> list[str]:
+    """Fields of a cells or particles file."""
+    with h5py.File(path) as file:
+        root = file["VTKHDF"]
+        return list(root["CellData" if "CellData" in root else "PointData"])
+
+
 def read_particles(path: Path) -> tuple[float, dict[str, np.ndarray]]:
     """Time [s] and columns, (n,) or (n, 3), of a particles file; "position" [m] among them."""
     with h5py.File(path) as file:
@@ -143,60 +177,41 @@ def read_particles(path: Path) -> tuple[float, dict[str, np.ndarray]]:
         return _read_time(root), {"position": root["Points"][()], **columns}
 
 
-# ---- laying down files (rank 0) --------------------------------------------------------------------------------------
+# ---- laying down files ----------------------------------------------------------------------------------------------
 
 
-def _create_cells(
-    path: Path, time: float, grid: Grid, chunk: tuple[int, ...], cells: Mapping[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Lay down a cells file; byte offsets of the chunks of each field, by block index (z, y, x).
-
-    Unused axes are left out of the datasets and have no extent: VTK then shows a line or a flat image.
-    """
+def _fill_cells(
+    grid: Grid, chunk: tuple[int, ...], shapes: Shapes, file: h5py.File, time: float
+) -> dict[str, h5py.Dataset]:
+    """Lay down a cells file; its fields."""
     unused = 3 - grid.dimensions
-    used = slice(unused, 3)
-    shape = tuple(grid.cells[::-1])
-    offsets = {}
-    with h5py.File(path, "w") as file:
-        root = _create_root(file, "ImageData", time)
-        root.attrs["WholeExtent"] = [v for n in shape[used][::-1] for v in (0, n)] + [0, 0] * unused
-        root.attrs["Origin"] = np.array(grid.lower, dtype=float)
-        root.attrs["Spacing"] = np.array(grid.spacing, dtype=float)
-        root.attrs["Direction"] = np.eye(3).ravel()
-        data = root.create_group("CellData")
-        for name, array in cells.items():
-            parts = array.shape[4:]
-            dataset = _create_dataset(data, name, shape[used] + parts, array.dtype, chunk[used] + parts)
-            offsets[name] = np.zeros([-(-n // c) for n, c in zip(shape, chunk, strict=True)], dtype=np.int64)
-            _fill_chunk_offsets(dataset, offsets[name].reshape(offsets[name].shape[used]), chunk[used])
-    return offsets
+    cells = grid.cells[: grid.dimensions]
+    root = _create_root(file, "ImageData", time)
+    root.attrs["WholeExtent"] = [v for n in cells for v in (0, n)] + [0, 0] * unused
+    root.attrs["Origin"] = np.array(grid.lower, dtype=float)
+    root.attrs["Spacing"] = np.array(grid.spacing, dtype=float)
+    root.attrs["Direction"] = np.eye(3).ravel()
+    data = root.create_group("CellData")
+    return {
+        name: create_dataset(data, name, tuple(cells[::-1]) + parts, dtype, chunk + parts)
+        for name, (parts, dtype) in shapes.items()
+    }
 
 
-def _fill_chunk_offsets(dataset: h5py.Dataset, offsets: np.ndarray, chunk: tuple[int, ...]) -> None:
-    def note(stored) -> None:
-        offsets[tuple(i // c for i, c in zip(stored.chunk_offset, chunk, strict=False))] = stored.byte_offset
-
-    dataset.id.chunk_iter(note)
-
-
-def _create_particles(path: Path, time: float, count: int, columns: Mapping[str, np.ndarray]) -> dict[str, int]:
-    """Lay down a particles file, one vertex per particle; byte offset of each column (0 if it holds nothing)."""
-    with h5py.File(path, "w") as file:
-        root = _create_root(file, "PolyData", time)
-        root["NumberOfPoints"] = [count]
-        root.create_group("PointData")
-        for topology in ("Vertices", "Lines", "Polygons", "Strips"):
-            used = count if topology == "Vertices" else 0
-            root[f"{topology}/NumberOfCells"] = [used]
-            root[f"{topology}/NumberOfConnectivityIds"] = [used]
-            if topology != "Vertices":
-                root[f"{topology}/Offsets"] = np.zeros(1, dtype=np.int64)
-                root[f"{topology}/Connectivity"] = np.zeros(0, dtype=np.int64)
-        rows = {name: count + (name == "Vertices/Offsets") for name in columns}
-        return {
-            name: _create_dataset(root, name, (rows[name], *array.shape[1:]), array.dtype, None).id.get_offset() or 0
-            for name, array in columns.items()
-        }
+def _fill_particles(count: int, shapes: Shapes, file: h5py.File, time: float) -> dict[str, h5py.Dataset]:
+    """Lay down a particles file, one vertex per particle; its columns."""
+    root = _create_root(file, "PolyData", time)
+    root["NumberOfPoints"] = [count]
+    root.create_group("PointData")
+    for topology in ("Vertices", "Lines", "Polygons", "Strips"):
+        used = count if topology == "Vertices" else 0
+        root[f"{topology}/NumberOfCells"] = [used]
+        root[f"{topology}/NumberOfConnectivityIds"] = [used]
+        if topology != "Vertices":
+            root[f"{topology}/Offsets"] = np.zeros(1, dtype=np.int64)
+            root[f"{topology}/Connectivity"] = np.zeros(0, dtype=np.int64)
+    rows = {name: count + (name == "Vertices/Offsets") for name in shapes}
+    return {name: create_dataset(root, name, (rows[name], *parts), dtype) for name, (parts, dtype) in shapes.items()}
 
 
 def _create_root(file: h5py.File, kind: str, time: float) -> h5py.Group:
@@ -205,13 +220,6 @@ def _create_root(file: h5py.File, kind: str, time: float) -> h5py.Group:
     root.attrs.create("Type", kind.encode(), dtype=h5py.string_dtype("ascii", len(kind)))
     root["FieldData/TimeValue"] = [float(time)]
     return root
-
-
-def _create_dataset(group: h5py.Group, name: str, shape, dtype, chunks) -> h5py.Dataset:
-    """A dataset whose place in the file is settled at once and is not filled."""
-    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    return group.create_dataset(name, shape, dtype, chunks=chunks, fill_time="never", dcpl=layout)
 
 
 def _read_time(root: h5py.Group) -> float:
@@ -229,12 +237,25 @@ def _series_path(directory: Path, kind: str) -> Path:
     return directory / f"{kind}.vtkhdf.series"
 
 
-def _remove_series(directory: Path, kind: str) -> None:
-    """Remove the index first, then what it lists: no listed file is ever missing."""
-    _series_path(directory, kind).unlink(missing_ok=True)
-    for pattern in (f"{kind}-[0-9]*.vtkhdf", f"{kind}-[0-9]*.vtkhdf.tmp"):
-        for path in directory.glob(pattern):
-            path.unlink()
+def _keep_until(directory: Path, until: float | None) -> dict[str, dict[str, float]]:
+    """Remove the files after `until` [s], or all; the times of the others, by kind and name.
+
+    They leave the index first: no listed file is ever missing.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    kept: dict[str, dict[str, float]] = {}
+    for kind in KINDS:
+        listed = series(directory, kind) if until is not None else []
+        kept[kind] = {path.name: time for time, path in listed if time <= until}
+        if kept[kind]:
+            _write_series(directory, kind, kept[kind])
+        else:
+            _series_path(directory, kind).unlink(missing_ok=True)
+        for pattern in (f"{kind}-[0-9]*.vtkhdf", f"{kind}-[0-9]*.vtkhdf.tmp"):
+            for path in directory.glob(pattern):
+                if path.name not in kept[kind]:
+                    path.unlink()
+    return kept
 
 
 def _write_series(directory: Path, kind: str, times: Mapping[str, float]) -> None:
@@ -242,19 +263,4 @@ def _write_series(directory: Path, kind: str, times: Mapping[str, float]) -> Non
     temporary = path.with_name(path.name + ".tmp")
     files = [{"name": name, "time": time} for name, time in times.items()]
     temporary.write_text(json.dumps({"file-series-version": "1.0", "files": files}, indent=1) + "\n")
-    _replace(temporary, path)
-
-
-def _replace(temporary: Path, path: Path) -> None:
-    """Give a complete file its final name so that it is found whole even after a crash of the machine."""
-    _sync(temporary)
-    os.replace(temporary, path)
-    _sync(path.parent)
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    replace(temporary, path)

@@ -1,25 +1,29 @@
-"""What a picture shows of a run at one time: the plane through the middle of the domain, seen along z."""
+"""What a picture shows of a run at one time: a line, a plane, or a plane through three dimensions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from distfsi.output.fields import read_cells, read_particles, series
+from distfsi.output.fields import axis_across, field_names, read_layer, read_particles, series
+
+AXES = "xyz"
+ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of a plane, horizontal and vertical, by its normal
 
 Extent = tuple[float, float, float, float]  # left, right, bottom, top [m]; bottom = top in one dimension
+Plane = tuple[int, float]  # axis that it is normal to, place on that axis [m]
 
 
 @dataclass(frozen=True)
 class Frame:
     """A run at one `time` [s]; `cells` or `particles` are empty where it has none.
 
-    cells: fields (ny, nx) or (ny, nx, 3) over `extent`; particles: columns of those in the plane, typically `spacing`
-    [m] apart.
+    cells: fields (ny, nx) or (ny, nx, 3) over `extent`, x and y being the `axes` of the plane; particles: columns of
+    those in the plane, typically `spacing` [m] apart.
     """
 
     time: float
@@ -27,6 +31,7 @@ class Frame:
     cells: Mapping[str, np.ndarray]
     particles: Mapping[str, np.ndarray]
     spacing: float
+    axes: tuple[int, int] = (0, 1)
 
     @property
     def dimensions(self) -> int:
@@ -48,47 +53,85 @@ class Frame:
         return left + (np.arange(count) + 0.5) * (right - left) / count
 
 
+class Film:
+    """The frames of a run, in the order of their `times` [s], loaded one by one.
+
+    plane: where three dimensions are cut; by default through the middle, seen along z.
+    Raises FileNotFoundError when there are no field files, ValueError when the plane misses the domain.
+    """
+
+    def __init__(self, directory: Path, plane: Plane | None = None):
+        self._cells, self._particles = series(directory, "cells"), series(directory, "particles")
+        present = [files for files in (self._cells, self._particles) if files]
+        if not present:
+            raise FileNotFoundError(f"no field files in {directory}")
+        # A run that died between the two kinds of a time has one file less of the second.
+        self.times = [time for time, _ in min(present, key=len)]
+        self._plane = plane
+        if not self._cells:
+            self._box = self._box_of_particles()
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def cell_fields(self) -> list[str]:
+        """Names of the fields of the cells."""
+        return field_names(self._cells[0][1]) if self._cells else []
+
+    @property
+    def particle_fields(self) -> list[str]:
+        """Names of the fields of the particles."""
+        return field_names(self._particles[0][1]) if self._particles else []
+
+    def frames(self, numbers: Sequence[int], names: Sequence[str] | None = None) -> Iterator[Frame]:
+        """The frames of these numbers; `names`: the fields of the cells that are wanted, by default all."""
+        for number in numbers:
+            particles = self._particles[number][1] if self._particles else None
+            if self._cells:
+                yield self._with_cells(self._cells[number][1], particles, names)
+            else:
+                time, columns = read_particles(particles)
+                normal, place = self._plane or (2, 0.5 * (self._box[0][2] + self._box[1][2]))
+                axes = ACROSS[normal]
+                extent = tuple(float(corner[axis]) for axis in axes for corner in self._box)
+                yield Frame(time, extent, {}, *_near_plane(columns, normal, place), axes)
+
+    def _with_cells(self, cells: Path, particles: Path | None, names: Sequence[str] | None) -> Frame:
+        normal, place = self._plane or (axis_across(cells), None)
+        time, fields, (low, high) = read_layer(cells, normal, place, names)
+        axes = ACROSS[normal]
+        extent = tuple(float(corner[axis]) for axis in axes for corner in (low, high))
+        middle = 0.5 * (low[normal] + high[normal])
+        near, distance = _near_plane(read_particles(particles)[1], normal, middle) if particles else ({}, 0.0)
+        return Frame(time, extent, fields, near, distance, axes)
+
+    def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Low and high corner of the box around all particles at all times, with some room."""
+        corners = [read_particles(path)[1]["position"] for _, path in self._particles]
+        low = np.min([position.min(axis=0) for position in corners], axis=0)
+        high = np.max([position.max(axis=0) for position in corners], axis=0)
+        margin = 0.05 * (high - low).max() * (high > low)
+        return low - margin, high + margin
+
+
 def load_frames(directory: Path, count: int) -> list[Frame]:
     """Up to `count` frames, evenly chosen from the field files in `directory`, the first and the last among them.
 
     Raises FileNotFoundError when there are no field files.
     """
-    cells, particles = series(directory, "cells"), series(directory, "particles")
-    # A run that died between the two kinds of a time has one file less of the second.
-    available = min(len(files) for files in (cells, particles) if files) if cells or particles else 0
-    if available == 0:
-        raise FileNotFoundError(f"no field files in {directory}")
-    chosen = sorted(set(np.linspace(0, available - 1, count).round().astype(int).tolist()))
-    if cells:
-        return [_load_both(cells[i][1], particles[i][1] if particles else None) for i in chosen]
-    return _load_particles([particles[i][1] for i in chosen])
+    film = Film(directory)
+    chosen = sorted(set(np.linspace(0, len(film) - 1, count).round().astype(int).tolist()))
+    return list(film.frames(chosen))
 
 
-def _load_both(cells: Path, particles: Path | None) -> Frame:
-    time, fields, origin, spacing = read_cells(cells)
-    nz, ny, nx = next(iter(fields.values())).shape[:3]
-    middle = origin[2] + spacing[2] * (nz // 2 + 0.5) * (nz > 1)
-    extent = (origin[0], origin[0] + nx * spacing[0], origin[1], origin[1] + ny * spacing[1] * (ny > 1))
-    near, distance = _near_plane(read_particles(particles)[1], middle) if particles else ({}, 0.0)
-    return Frame(time, extent, {name: field[nz // 2] for name, field in fields.items()}, near, distance)
-
-
-def _load_particles(paths: Sequence[Path]) -> list[Frame]:
-    loaded = [read_particles(path) for path in paths]
-    positions = np.concatenate([columns["position"] for _, columns in loaded])
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    margin = 0.05 * (high - low).max() * (high > low)
-    extent = tuple(np.stack([low - margin, high + margin])[:, :2].T.ravel().tolist())
-    middle = 0.5 * (low[2] + high[2])
-    return [Frame(time, extent, {}, *_near_plane(columns, middle)) for time, columns in loaded]
-
-
-def _near_plane(columns: Mapping[str, np.ndarray], middle: float) -> tuple[dict[str, np.ndarray], float]:
-    """The particles within half their spacing of the plane z = `middle`, and their spacing (median to the nearest)."""
+def _near_plane(columns: Mapping[str, np.ndarray], normal: int, place: float) -> tuple[dict[str, np.ndarray], float]:
+    """The particles within half their spacing of a plane, and their spacing: that of the sparser direction."""
     position = columns["position"]
     if len(position) < 2:
         return dict(columns), 0.0
     some = position[:: max(1, len(position) // 1000)]
-    spacing = float(np.median(cKDTree(position).query(some, k=2)[0][:, 1]))
-    near = np.abs(position[:, 2] - middle) <= 0.5 * spacing
+    neighbours = min(2 * np.count_nonzero(np.ptp(position, axis=0)), len(position) - 1)  # of a particle in a lattice
+    spacing = float(np.median(cKDTree(position).query(some, k=neighbours + 1)[0][:, -1]))
+    near = np.abs(position[:, normal] - place) <= 0.5 * spacing
     return {name: column[near] for name, column in columns.items()}, spacing

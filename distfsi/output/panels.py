@@ -1,36 +1,30 @@
-"""The panels of a picture: profiles along a line, maps of a plane, curves over time. Lengths on paper are in inches."""
+"""The panels of a picture: profiles along a line, curves over time. Lengths on paper are in inches."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import EllipseCollection
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm
 from matplotlib.figure import FigureBase
 from matplotlib.transforms import Bbox
 
 from distfsi.output.frames import Frame
 from distfsi.output.progress import format_time
+from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
 
-UNITS = {"density": "kg/m³", "pressure": "Pa", "velocity": "m/s", "speed": "m/s"}
 PROFILES = ("density", "pressure", "velocity", "volume_fraction", "plastic_strain")
-MAPS = {"pressure": "viridis", "density": "bone_r"}
-PARTICLE_COLORS = "plasma"
+LOGARITHMIC = ("density", "pressure")  # where they span decades
 TIME_COLORS = ("0.55", "tab:blue")
-PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
-DECADES = 100.0  # positive values whose largest and smallest differ by more get a logarithmic scale
-
 ROUNDING = 1e-12  # an energy that changes by less, relatively, is not drawn
 
 WIDTH = 12.0
-LEFT, BAR_RIGHT, BAR_BELOW = 0.9, 1.2, 0.75  # room for the labels of an axis, for a colour bar beside or below panels
+LEFT = 0.9  # room for the labels of an axis
 GAP, TITLE, XLABEL = 0.35, 0.4, 0.6  # between panels, above them, below the last of them
-PROFILE_HEIGHT, HISTORY_HEIGHT, MAPS_HEIGHT = 1.6, 4.0, 11.0
-UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps stand side by side
+PROFILE_HEIGHT, HISTORY_HEIGHT = 1.6, 3.9
 
 
 # ---- profiles: runs along x ------------------------------------------------------------------------------------------
@@ -38,27 +32,20 @@ UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps sta
 
 def profiles_height(frames: Sequence[Frame]) -> float:
     """Height that `draw_profiles` needs."""
-    return len(_profile_names(frames[0])) * (PROFILE_HEIGHT + 0.5 * GAP) + XLABEL + TITLE
+    return len(_profile_names(frames)) * (PROFILE_HEIGHT + 0.5 * GAP) + XLABEL + TITLE
 
 
-def draw_profiles(figure: FigureBase, frames: Sequence[Frame]) -> None:
-    """One row per field over x, one colour per time: cells as lines, particles as dots."""
-    names = _profile_names(frames[0])
+def draw_profiles(figure: FigureBase, frames: Sequence[Frame], fitted: Sequence[Frame] = ()) -> None:
+    """One row per field over x, one colour per time: cells as lines, particles as dots; axes fit the frames `fitted`,
+    by default those drawn."""
+    fitted = fitted or frames
+    names = _profile_names(fitted)
     left, right, _, _ = frames[0].extent
     length, metres = scaled("m", right - left)
     margins, gaps = (LEFT, 0.3, XLABEL, TITLE), (0.0, 0.5 * GAP)
-    rows = _panels(figure, len(names), 1, margins, gaps, sharex=True)[:, 0]
+    rows = grid_of_panels(figure, len(names), 1, margins, gaps, sharex=True)[:, 0]
     for axes, name in zip(rows, names, strict=True):
-        curves = [list(_curves(frame, name)) for frame in frames]
-        everything = [values for some in curves for _, values, _ in some]
-        size, unit = scaled(UNITS.get(name, ""), _largest(everything))
-        for some, color in zip(curves, TIME_COLORS, strict=False):
-            for x, values, style in some:
-                axes.plot(x / length, values / size, style, color=color, markersize=3)
-        if name in MAPS and isinstance(_norm(everything), LogNorm):
-            axes.set_yscale("log")
-        axes.set_ylabel(_label(name, unit))
-        axes.grid(alpha=0.3)
+        _draw_profile(axes, name, frames, fitted, length)
     times = [f"t = {format_time(frame.time)}" for frame in frames]
     handles = [axes.plot([], [], color=color)[0] for color, _ in zip(TIME_COLORS, frames, strict=False)]
     rows[0].legend(handles, times, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
@@ -66,9 +53,25 @@ def draw_profiles(figure: FigureBase, frames: Sequence[Frame]) -> None:
     figure.align_ylabels(rows)
 
 
-def _profile_names(frame: Frame) -> list[str]:
-    present = dict.fromkeys([*frame.cells, *frame.particles])
-    return [name for known in PROFILES for name in present if name.startswith(known)]
+def _draw_profile(axes: Axes, name: str, frames: Sequence[Frame], fitted: Sequence[Frame], length: float) -> None:
+    everything = [values for frame in fitted for _, values, _ in _curves(frame, name)]
+    size, unit = scaled(UNITS.get(name, ""), largest(everything))
+    for frame, color in zip(frames, TIME_COLORS, strict=False):
+        for x, values, style in _curves(frame, name):
+            axes.plot(x / length, values / size, style, color=color, markersize=3)
+    norm = norm_of([values / size for values in everything])
+    if name in LOGARITHMIC and isinstance(norm, LogNorm):
+        axes.set(yscale="log", ylim=(norm.vmin / 1.3, norm.vmax * 1.3))
+    else:
+        room = 0.05 * ((norm.vmax - norm.vmin) or abs(norm.vmax) or 1.0)
+        axes.set_ylim(norm.vmin - room, norm.vmax + room)
+    axes.set_ylabel(label_of(name, unit))
+    axes.grid(alpha=0.3)
+
+
+def _profile_names(frames: Sequence[Frame]) -> list[str]:
+    """The fields worth a row: not zero everywhere at all times."""
+    return [name for name in PROFILES if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
 
 
 def _curves(frame: Frame, name: str) -> Iterator[tuple[np.ndarray, np.ndarray, str]]:
@@ -83,144 +86,66 @@ def _along_x(values: np.ndarray) -> np.ndarray:
     return values[:, 0] if values.ndim == 2 else values
 
 
-# ---- maps: runs in a plane, or the middle plane of three dimensions --------------------------------------------------
-
-
-def maps_height(frames: Sequence[Frame]) -> float:
-    """Height that `draw_maps` needs."""
-    rows, _, _, height, (_, _, below, above) = _map_sheet(frames)
-    return rows * height + (rows - 1) * (TITLE + 0.1) + below + above
-
-
-def draw_maps(figure: FigureBase, frames: Sequence[Frame]) -> None:
-    """Each field at each time, particles on top; times side by side, or one below the other where domains are wide."""
-    names, upright = _map_names(frames[0]), _upright(frames)
-    rows, columns, _, _, margins = _map_sheet(frames)
-    grid = _panels(figure, rows, columns, margins, (GAP, TITLE + 0.1), sharex=True, sharey=True)
-    by_field = grid if upright else grid.T
-    left, right, bottom, top = frames[0].extent
-    length, metres = scaled("m", max(right - left, top - bottom))
-    for axes, name in zip(by_field, names, strict=True):
-        if name:
-            _draw_field(figure, axes, frames, name, length, "right" if upright else "below")
-        for panel, frame in zip(axes, frames, strict=True):
-            panel.set(title=f"t = {format_time(frame.time)}")
-    if _has_particles(frames):
-        _draw_particles(figure, by_field, frames, length, "below" if upright else "right")
-    grid[0, 0].set(xlim=(left / length, right / length), ylim=(bottom / length, top / length))
-    for panel in grid[-1]:
-        panel.set_xlabel(f"x [{metres}]")
-    for panel in grid[:, 0]:
-        panel.set_ylabel(f"y [{metres}]")
-
-
-def _map_names(frame: Frame) -> list[str | None]:
-    """The fields worth a map; a single None for particles alone."""
-    return [name for name in MAPS if name in frame.cells] or [None]
-
-
-def _upright(frames: Sequence[Frame]) -> bool:
-    return frames[0].aspect > UPRIGHT_ASPECT
-
-
-def _map_sheet(frames: Sequence[Frame]) -> tuple[int, int, float, float, tuple[float, float, float, float]]:
-    """Rows, columns, width and height of a panel, and margins, of the maps."""
-    fields, times = len(_map_names(frames[0])), len(frames)
-    upright, particles = _upright(frames), _has_particles(frames)
-    rows, columns = (fields, times) if upright else (times, fields)
-    beside = bool(frames[0].cells) if upright else particles
-    below = particles if upright else bool(frames[0].cells)
-    right, bottom = BAR_RIGHT if beside else 0.3, XLABEL + BAR_BELOW * below
-    room = (WIDTH - LEFT - right - (columns - 1) * GAP) / columns
-    width = min(room, MAPS_HEIGHT / rows / frames[0].aspect)
-    # What the panels leave of the width goes to both sides.
-    spare = 0.5 * columns * (room - width)
-    return rows, columns, width, width * frames[0].aspect, (LEFT + spare, right + spare, bottom, TITLE)
-
-
-def _draw_field(
-    figure: FigureBase, axes: Sequence[Axes], frames: Sequence[Frame], name: str, length: float, side: str
-) -> None:
-    size, unit = scaled(UNITS[name], _largest(frame.cells[name] for frame in frames))
-    norm = _norm([frame.cells[name] / size for frame in frames])
-    extent = [value / length for value in frames[0].extent]
-    for panel, frame in zip(axes, frames, strict=True):
-        values = np.ma.masked_invalid(frame.cells[name] / size)
-        panel.imshow(values, origin="lower", extent=extent, norm=norm, cmap=MAPS[name], aspect="auto")
-    _draw_bar(figure, axes, ScalarMappable(norm, MAPS[name]), _label(name, unit), side)
-
-
-def _has_particles(frames: Sequence[Frame]) -> bool:
-    return any(len(frame.particles.get("position", ())) for frame in frames)
-
-
-def _draw_particles(
-    figure: FigureBase, by_field: np.ndarray, frames: Sequence[Frame], length: float, side: str
-) -> None:
-    """Discs of the size of the particles, coloured by plastic strain or, where nothing has yielded, by speed."""
-    name, values = _particle_colors(frames)
-    colors = ScalarMappable(Normalize(0.0, _largest(values) or 1.0), PARTICLE_COLORS)
-    for axes in by_field:
-        for panel, frame, value in zip(axes, frames, values, strict=True):
-            diameters = np.full(len(value), frame.spacing / length)
-            discs = EllipseCollection(
-                diameters,
-                diameters,
-                np.zeros(len(value)),
-                units="xy",
-                offsets=frame.particles["position"][:, :2] / length,
-                offset_transform=panel.transData,
-                facecolors=colors.to_rgba(value),
-                linewidths=0.0,
-            )
-            panel.add_collection(discs)
-    _draw_bar(figure, by_field.ravel(), colors, _label(name, UNITS.get(name, "")), side)
-
-
-def _particle_colors(frames: Sequence[Frame]) -> tuple[str, list[np.ndarray]]:
-    strains = [frame.particles.get("plastic_strain", np.zeros(0)) for frame in frames]
-    if _largest(strains) > 0.0:
-        return "plastic_strain", strains
-    return "speed", [np.linalg.norm(frame.particles["velocity"], axis=1) for frame in frames]
-
-
 # ---- history ---------------------------------------------------------------------------------------------------------
 
 
 def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
     """Over time: the change of each energy, the drift of each conserved total, and the time step."""
     time = history["time [s]"]
-    size, unit = scaled("s", _largest([time]))
-    step = np.where(history["time step [s]"] > 0.0, history["time step [s]"], np.nan)
-    step_size, step_unit = scaled("s", _largest([step]))
-    drifts = {name.removeprefix("drift "): values for name, values in history.items() if name.startswith("drift ")}
-    energies = {
-        name: values - values[:1]
-        for name, values in history.items()
-        if name.endswith("energy [J]")
-        and not name.startswith("drift ")
-        and np.ptp(values) > ROUNDING * np.abs(values).max()
-    }
+    size, unit = scaled("s", largest([time]))
+    free = [reason not in ("start", "end time") for reason in history["limited by"]]
+    step = np.where(free, history["time step [s]"], np.nan)
+    step_size, step_unit = scaled("s", largest([step]))
+    drifts = {name: values for name, values in history.items() if name.startswith("drift ")}
     panels = (
-        ("change of energy [J]", energies),
+        ("change of energy [J]", _changes(_energies(history))),
         ("relative drift of totals", drifts),
         (f"time step [{step_unit}]", {"": step / step_size}),
     )
-    for axes, (title, curves) in zip(
-        _panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.3), (1.0, 0.0))[0], panels, strict=True
-    ):
+    places = grid_of_panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.1), (1.0, 0.0))[0]
+    for axes, (title, curves) in zip(places, panels, strict=True):
         for name, values in curves.items():
-            axes.plot(time / size, values, label=re.sub(r" \[.*", "", name).replace("_", " "))
+            axes.plot(time / size, values, label=re.sub(r"^drift | \[.*", "", name).replace("_", " "))
         axes.set(xlabel=f"time [{unit}]", ylabel=title)
         axes.grid(alpha=0.3)
         if len(curves) > 1:
-            axes.legend(fontsize="x-small", loc="lower left", bbox_to_anchor=(-0.15, 1.06), ncols=2, frameon=False)
+            draw_legend(axes)
+
+
+def _energies(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Energies of the parts; what the coupling makes or loses as one."""
+    names = [name for name in history if name.endswith("energy [J]") and not name.startswith("drift ")]
+    energies = {name: history[name] for name in names if not name.startswith("ledger ")}
+    ledger = [history[name] for name in names if name.startswith("ledger ")]
+    return energies | ({"made by the coupling": sum(ledger)} if ledger else {})
+
+
+def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Energies that change, less what they are at the start."""
+    largest_of_all = max((np.abs(values).max() for values in energies.values()), default=0.0)
+    return {
+        name: values - values[:1]
+        for name, values in energies.items()
+        if np.ptp(values) > ROUNDING * largest_of_all
+    }
+
+
+def draw_legend(axes: Axes, columns: int = 2) -> None:
+    """A small legend above a panel, clear of the exponent of its axis."""
+    axes.legend(
+        fontsize="x-small",
+        loc="lower left",
+        bbox_to_anchor=(-0.12, 1.07),
+        ncols=columns,
+        frameon=False,
+        borderaxespad=0.0,
+    )
 
 
 # ---- places on the sheet ---------------------------------------------------------------------------------------------
 
 
-def _panels(
+def grid_of_panels(
     figure: FigureBase,
     rows: int,
     columns: int,
@@ -244,7 +169,7 @@ def _panels(
     return figure.subplots(rows, columns, squeeze=False, gridspec_kw=places, **shared)
 
 
-def _draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, label: str, side: str) -> None:
+def draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, label: str, side: str) -> None:
     """A colour bar along the right or the lower edge of some panels."""
     width, height = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
     box = Bbox.union([panel.get_position() for panel in axes])
@@ -254,30 +179,3 @@ def _draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, 
     else:
         place = (box.x0, box.y0 - (XLABEL + 0.15) / height, box.width, 0.15 / height)
         figure.colorbar(colors, cax=figure.add_axes(place), label=label, orientation="horizontal")
-
-
-# ---- scales and labels -----------------------------------------------------------------------------------------------
-
-
-def scaled(unit: str, largest: float) -> tuple[float, str]:
-    """The decimal multiple of a unit that suits values up to `largest`: (1e6, "MPa"); only m, s and Pa take one."""
-    if unit not in ("m", "s", "Pa"):
-        return 1.0, unit
-    size = next((size for size in PREFIXES if largest >= 0.9999 * size), 1.0)
-    return size, PREFIXES[size] + unit
-
-
-def _largest(arrays: Iterable[np.ndarray]) -> float:
-    """The largest finite magnitude in any of the arrays, 0 if there is none."""
-    return max((float(np.abs(a[np.isfinite(a)]).max(initial=0.0)) for a in arrays), default=0.0)
-
-
-def _norm(arrays: Sequence[np.ndarray]) -> Normalize:
-    values = np.concatenate([array[np.isfinite(array)] for array in arrays])
-    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
-    return LogNorm(low, high) if 0.0 < low < high / DECADES else Normalize(low, high)
-
-
-def _label(name: str, unit: str) -> str:
-    words = name.replace("_", " ")
-    return f"{words} [{unit}]" if unit else words

@@ -13,17 +13,10 @@ from matplotlib.figure import Figure
 
 from distfsi.output.frames import load_frames
 from distfsi.output.history import read_history
-from distfsi.output.panels import (
-    HISTORY_HEIGHT,
-    WIDTH,
-    draw_history,
-    draw_maps,
-    draw_profiles,
-    maps_height,
-    profiles_height,
-)
+from distfsi.output.maps import Sheet, draw_maps, summary_colors
+from distfsi.output.panels import HISTORY_HEIGHT, WIDTH, draw_history, draw_profiles, profiles_height
 
-TIMES = 4
+TIMES, RESOLUTION = 4, 110  # dots per inch
 STYLE = {
     "font.size": 10,
     "axes.titlesize": 10,
@@ -42,17 +35,21 @@ def draw_summary(directory: Path) -> Path:
     directory = Path(directory)
     frames = load_frames(directory, TIMES)
     history = read_history(directory / "history.csv")
+    lines = frames[0].dimensions == 1
+    if lines:
+        frames = [frames[0], *frames[1:][-1:]]
+    else:
+        fields, particles = summary_colors(frames)
+        sheet = Sheet(frames[0].aspect, len(fields), len(frames), particles is not None)
     with matplotlib.rc_context(STYLE):
-        if frames[0].dimensions == 1:
-            frames = [frames[0], *frames[1:][-1:]]
-            draw, height = draw_profiles, profiles_height(frames)
-        else:
-            draw, height = draw_maps, maps_height(frames)
-        heights = [height, HISTORY_HEIGHT]
+        heights = [profiles_height(frames) if lines else sheet.height, HISTORY_HEIGHT]
         figure = Figure(figsize=(WIDTH, sum(heights)))
-        fields, curves = figure.subfigures(2, 1, height_ratios=heights, hspace=0.0)
-        draw(fields, frames)
-        draw_history(curves, history)
+        upper, lower = figure.subfigures(2, 1, height_ratios=heights, hspace=0.0)
+        if lines:
+            draw_profiles(upper, frames)
+        else:
+            draw_maps(upper, sheet, frames, fields, particles)
+        draw_history(lower, history)
         path = directory / "summary.png"
-        figure.savefig(path, dpi=110)
+        figure.savefig(path, dpi=RESOLUTION)
     return path

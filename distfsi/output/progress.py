@@ -49,10 +49,14 @@ class Progress:
 
     def finish(self, message: str) -> None:
         """Take the bar away and print `message`."""
-        if self._bar:
-            self._bar.stop()
+        self.close()
         if self._shown:
             print(message, flush=True)
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar:
+            self._bar.stop()
 
     def _start_bar(self) -> RichProgress:
         one_line = Column(no_wrap=True, overflow="ellipsis")

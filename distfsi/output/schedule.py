@@ -15,12 +15,12 @@ class Every:
 
     def __init__(self, interval: float):
         self._interval = interval
-        self._next = 0.0  # as a multiple of the interval
+        self.next = 0.0  # as a multiple of the interval
 
     def due(self, time: float) -> bool:
         """Whether output is due at `time` [s]; if so, the next one is due an interval later."""
         multiple = math.floor(time / self._interval * (1.0 + ROUNDING)) if self._interval > 0.0 else 0.0
-        if multiple < self._next:
+        if multiple < self.next:
             return False
-        self._next = multiple + 1.0
+        self.next = multiple + 1.0
         return True

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ from distfsi.errors import InputError, OutputError
 from distfsi.output.interfaces import Communicator
 
 LayDown = Callable[[h5py.File], Mapping[str, h5py.Dataset]]
+ROOM = 2**20  # bytes, more than HDF5 needs besides the values
 Piece = tuple[str, tuple[int, ...], np.ndarray]  # name of the dataset, index of the first value, values
 
 
@@ -29,7 +31,7 @@ class Storage(Protocol):
     def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
         """Write a new file `path`; collective. Raises OutputError on all ranks.
 
-        `lay_down` fills an open file, by the same rule on every rank, and returns datasets of `create_dataset` by name.
+        `lay_down`, called on rank 0, fills an open file and returns datasets of `create_dataset` by name.
         `pieces`: what this rank puts there, maybe nothing. A piece is one whole chunk, which may reach beyond the
         dataset's end, or, in a dataset without chunks, some rows.
         """
@@ -38,9 +40,44 @@ class Storage(Protocol):
 def storage(name: str, communicator: Communicator) -> Storage:
     """The storage called "mpi-io", "mpio" or "gather". Raises InputError when this h5py has no "mpio"."""
     if name == "mpio" and not h5py.get_config().mpi:
-        remedy = 'launch/install-parallel-hdf5.sh builds one; "mpi-io" writes from all ranks without'
-        raise InputError([f'output.hdf5: "mpio" needs an h5py with parallel HDF5, this one has none: {remedy}'])
+        remedy = 'launch/install-parallel-hdf5.sh builds one; "mpi-io" also writes from all ranks, and needs none'
+        raise InputError([f'output.hdf5: "mpio" needs an h5py with parallel HDF5: {remedy}'])
     return {"mpi-io": MpiIo, "mpio": ParallelHdf5, "gather": Gather}[name](communicator)
+
+
+def write_complete(
+    storage: Storage, communicator: Communicator, path: Path, lay_down: LayDown, pieces: Sequence[Piece]
+) -> None:
+    """Write a file (see Storage.write) that has its name only once it is complete and on disk; a failed one is removed.
+
+    Collective. Raises OutputError on all ranks.
+    """
+    temporary = path.with_name(path.name + ".tmp")
+    try:
+        storage.write(temporary, lay_down, pieces)
+    except OutputError:
+        on_root(communicator, temporary, lambda: temporary.unlink(missing_ok=True))
+        raise
+    on_root(communicator, path, lambda: replace(temporary, path))
+
+
+def prepare_directory(directory: Path, communicator: Communicator) -> None:
+    """Make a run's directory if there is none. Collective. Raises InputError on all ranks when it cannot be used."""
+    cause = communicator.broadcast(_unusable(directory) if communicator.rank == 0 else "")
+    if cause:
+        raise InputError([f"output.directory: {directory} cannot be written to: {cause}"])
+
+
+def _unusable(directory: Path) -> str:
+    """What prevents files in a directory; empty if nothing does."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            return ""
+    except FileExistsError:
+        return "it is a file"
+    except OSError as error:
+        return error.strerror
 
 
 class MpiIo:
@@ -71,18 +108,19 @@ class Gather:
 
 
 class ParallelHdf5:
-    """All ranks open the file through HDF5's own MPI driver."""
+    """Rank 0 lays down the file and reserves its space, and all ranks write to it through HDF5's own MPI driver."""
 
     def __init__(self, communicator: Communicator):
         self._communicator = communicator
 
     def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
+        names = on_root(self._communicator, path, lambda: _reserve(path, lay_down))
+
         def write() -> None:
-            with h5py.File(path, "w", driver="mpio", comm=self._communicator.world) as file:
-                datasets = lay_down(file)
+            with h5py.File(path, "r+", driver="mpio", comm=self._communicator.world) as file:
                 # Each by itself, not collectively: ranks have different numbers of pieces.
                 for name, start, values in pieces:
-                    _put(datasets[name], start, values)
+                    _put(file[names[name]], start, values)
                 file.flush()
 
         _, failure = _attempt(path, write)
@@ -115,7 +153,11 @@ class Places:
         def note(stored) -> None:
             self._bytes[tuple(np.floor_divide(stored.chunk_offset, self._chunk))] = stored.byte_offset
 
-        dataset.id.chunk_iter(note)
+        if hasattr(dataset.id, "chunk_iter"):
+            dataset.id.chunk_iter(note)
+        else:  # HDF5 before 1.12.3, slow with many chunks
+            for chunk in map(dataset.id.get_chunk_info, range(dataset.id.get_num_chunks())):
+                note(chunk)
 
     def offset(self, start: Sequence[int]) -> int:
         """Byte offset of the value at index `start`."""
@@ -126,6 +168,20 @@ class Places:
 def _create(path: Path, lay_down: LayDown) -> dict[str, Places]:
     with h5py.File(path, "w") as file:
         return {name: Places(dataset) for name, dataset in lay_down(file).items()}
+
+
+def _reserve(path: Path, lay_down: LayDown) -> dict[str, str]:
+    """Create a file that has all the space it needs; where its datasets are.
+
+    HDF5's MPI driver may notice nothing on a disk that runs full, and old versions crash when they close a file there.
+    """
+    path.write_bytes(bytes(ROOM))
+    with h5py.File(path, "w") as file:
+        names = {name: dataset.name for name, dataset in lay_down(file).items()}
+    with path.open("r+b") as file:
+        os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
+        os.fsync(file.fileno())
+    return names
 
 
 def _add(path: Path, places: Mapping[str, Places], pieces: Sequence[Piece]) -> None:
@@ -143,6 +199,24 @@ def _put(dataset: h5py.Dataset, start: Sequence[int], values: np.ndarray) -> Non
     if values.size:
         target = tuple(slice(first, first + n) for first, n in zip(start, counts, strict=True))
         dataset[target] = values[tuple(map(slice, counts))]
+
+
+# ---- names -----------------------------------------------------------------------------------------------------------
+
+
+def replace(temporary: Path, path: Path) -> None:
+    """Give a complete file its final name so that it is found whole even after a crash of the machine."""
+    _sync(temporary)
+    os.replace(temporary, path)
+    _sync(path.parent)
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 # ---- errors ----------------------------------------------------------------------------------------------------------

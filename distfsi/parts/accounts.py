@@ -24,6 +24,7 @@ class Accounts:
         momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
         self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
+        self._names = [name.split(" [")[0] for name in self.conserved]
         self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]

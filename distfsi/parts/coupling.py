@@ -10,7 +10,7 @@ from distfsi.device import cpu
 from distfsi.kernels import coupling as kernels
 from distfsi.kernels import solid as particle_kernels
 from distfsi.kernels.regions import copy_regions
-from distfsi.mesh.blocks import GHOSTS, Blocks
+from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
@@ -150,6 +150,7 @@ class Coupling:
         The input's ghost cells must be filled; those of covered cells need not be.
         """
         U, run, k = self.fluid.input_of(stage), self.team.run, self.fluid_kernels
+        self.fluid.wake(self._occupied > 0)
         around = (self._kinds, self._shape, self._offsets, self._weights, self._rings, self._rest)
         run(k.fill_covered, len(self._covered), self._covered, self._velocity, U, *around)
         run(k.fill_deep, len(self._deep), self._deep, U, self._shape, self._rest)
@@ -221,6 +222,20 @@ class Coupling:
     def covered(self) -> np.ndarray:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
         return self.kind[:, 0] >= kernels.COVERED
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs: which cells are covered, so that those are known that come free; and the books."""
+        return {
+            "cells": {"kind": self.blocks.without_ghosts(self.kind)},
+            "sums": {**self._ledger, "sides": self._through_sides},
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.blocks.without_ghosts(self.kind)[:] = snapshot["cells"]["kind"]
+        self._occupied[:] = 1
+        for cause, amounts in {**self._ledger, "sides": self._through_sides}.items():
+            amounts[:] = snapshot["sums"][cause]
 
     def ledger(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""

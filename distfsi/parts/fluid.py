@@ -10,9 +10,10 @@ from distfsi.device import cpu
 from distfsi.errors import Diverged
 from distfsi.kernels import fluid as kernels
 from distfsi.kernels.regions import copy_regions
-from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.parts.initial import InitialState
+from distfsi.parts.rest import Rest
 from distfsi.scene.description import Scene
 
 
@@ -25,19 +26,26 @@ class Stage:
     weight: float
 
 
+SSP_RK2 = (Stage(0, 1.0, 0.5), Stage(1, 0.5, 0.5))  # Gottlieb, Shu, Tadmor, SIAM Rev. 43, 2001
 SSP_RK3 = (Stage(0, 1.0, 1.0 / 6.0), Stage(1, 0.25, 1.0 / 6.0), Stage(2, 2.0 / 3.0, 2.0 / 3.0))  # paper, Eq. 16
-LAST = len(SSP_RK3) - 1
+SCHEMES = {"rk2": SSP_RK2, "rk3": SSP_RK3}
+
+
+def _output(number: int) -> int:
+    """Which buffer a stage writes: 1 and 2 in turn, never the one it reads nor the state before the step."""
+    return 1 + number % 2
 
 
 class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step.
+    step. stages: those that make a step.
     """
 
     def __init__(self, scene: Scene, model, blocks: Blocks, team: cpu.Team):
         self.model, self.blocks, self.team = model, blocks, team
+        self.stages = SCHEMES[scene.time.scheme]
         self.exchange = GhostExchange(blocks, cpu.build([copy_regions], {}).copy_regions)
         real = scene.fluid.precision
         self.kernels = cpu.build(
@@ -64,7 +72,7 @@ class Fluid:
         """Cut the blocks into tiles; those whose ghosts come from other ranks are computed last."""
         blocks, grid = self.blocks, self.blocks.grid
         size = [min(t, n) for t, n in zip((*tile_cells, 1, 1)[:3], blocks.block_cells, strict=True)]
-        rows = []
+        rows, places = [], []
         for block in range(blocks.local_count):
             extent, origin = blocks.extent[block], blocks.origin[block]
             starts = [range(0, extent[axis], size[axis]) for axis in range(3)]
@@ -74,11 +82,13 @@ class Fluid:
                         first = np.array([x, y, z])
                         cells = np.minimum(size, extent - first)
                         rows.append([block, *(first + grid.ghosts), *cells, self._sides(origin + first, cells)])
+                        places.append(origin + first)
         self.tiles = np.array(rows, dtype=np.int64).reshape(-1, 8)
         waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
         self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
         self._through = np.zeros((len(self.tiles), 6, self.model.conserved))
+        self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
 
     def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
         """Bits of the domain's sides that a tile touches; a periodic side is no side."""
@@ -95,9 +105,14 @@ class Fluid:
     def state(self) -> np.ndarray:
         return self._buffers[0]
 
+    @property
+    def previous(self) -> np.ndarray:
+        """The state before the last step, until the next one begins."""
+        return self._buffers[1]
+
     def input_of(self, stage: Stage) -> np.ndarray:
         """The state that a stage starts from."""
-        return self._buffers[stage.number]
+        return self._buffers[0] if stage.number == 0 else self._buffers[_output(stage.number - 1)]
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
@@ -106,23 +121,32 @@ class Fluid:
 
     def advance_stage(self, stage: Stage, dt: float) -> None:
         """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
+        self.rest.begin_stage()
         self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
         self.advance_tiles(self._ready_tiles, stage, dt)
         self.exchange.finish()
         self.advance_tiles(self._waiting_tiles, stage, dt)
-        if stage.number == LAST:
-            a, b, c = self._buffers
-            self._buffers = [b, a, c]
+        self.rest.end_stage()
+        if stage is self.stages[-1]:
+            new = self._buffers.pop(_output(stage.number))
+            self._buffers.insert(0, new)
 
     def advance_tiles(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
-        """Advance the tiles of the given numbers by one stage."""
-        output = self._buffers[1 if stage.number == LAST else stage.number + 1]
+        """Advance the tiles of the given numbers by one stage; those that are calm only if their fluxes are booked."""
+        tiles = tiles[~self.rest.calm[tiles] | (self.tiles[tiles, kernels.SIDES] > 0)]
+        output = self._buffers[_output(stage.number)]
         real = output.dtype.type
         rates = (real(dt / h) for h in self.blocks.grid.spacing)
         self.team.run(
-            self.kernels.advance_tiles, len(tiles), tiles, self.tiles, self.state, self.input_of(stage), output,
-            self._through, real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
+            self.kernels.advance_tiles, len(tiles), tiles, self.tiles, self.rest.calm, self.rest.stages,
+            self.state, self.input_of(stage), output, self._through,
+            real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
         )  # fmt: skip
+
+    def wake(self, blocks: np.ndarray) -> None:
+        """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
+        true; to be called before the next stage."""
+        self.rest.wake(blocks[self.tiles[:, kernels.BLOCK]])
 
     def fastest_signal(self) -> float:
         """Largest sum over axes of (|u| + c)/h [1/s] on this rank: CFL number per time step. NaN when a cell has no
@@ -131,8 +155,9 @@ class Fluid:
             return 0.0
         real = self.state.dtype.type
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
+        changed = np.unique(self.tiles[~self.rest.settled, kernels.BLOCK])
         self.team.run(
-            self.kernels.fastest_signals, self.blocks.local_count, self.state, self._first_active(),
+            self.kernels.fastest_signals, len(changed), changed, self.state, self._first_active(),
             self.blocks.extent, *inverse, self._fastest,
         )  # fmt: skip
         return float(np.max(self._fastest))
@@ -146,25 +171,26 @@ class Fluid:
 
     def cells(self, block: int) -> np.ndarray:
         """View (variables, z, y, x) of the active cells of a local block."""
-        n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
-        return self.state[(block, slice(None), *(slice(a, a + b) for a, b in zip(g, n, strict=True)))]
+        return self.active(self.state, block)
 
-    def state_to_save(self) -> dict[str, dict[str, np.ndarray]]:
-        """What a restart file holds of the fluid; views, not copies."""
-        g, n = self.blocks.grid.ghosts[::-1], self.blocks.block_cells[::-1]
-        whole_blocks = tuple(slice(a, a + b) for a, b in zip(g, n, strict=True))
-        return {"cells": {"state": self.state[(..., *whole_blocks)]}, "sums": {"through": self._through}}
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        return {"cells": {"state": self.blocks.without_ghosts(self.state)}, "sums": {"through": self._through}}
 
-    def restore(self, saved: Mapping[str, Mapping[str, np.ndarray]]) -> None:
-        """Continue from what `state_to_save` gave, on this rank's blocks."""
-        for block in range(self.blocks.local_count):
-            z, y, x = self.blocks.extent[block][::-1]
-            self.cells(block)[:] = saved["cells"]["state"][block, :, :z, :y, :x]
-        self._through[:] = saved["sums"]["through"]
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
+        self._through[:] = snapshot["sums"]["through"]
+        self.rest.wake()
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""
         return sum(buffer.nbytes for buffer in self._buffers)
+
+    def share_at_rest(self) -> float:
+        """Collective. The part of all tile stages in which the tile was at rest."""
+        rested, everything = self.blocks.communicator.concatenate(self.rest.counts[None]).sum(axis=0)
+        return rested / max(everything, 1)
 
     def totals(self, covered: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Masses, momentum and energy (conserved,) of all ranks' cells, and the sums of their absolute values.
@@ -175,10 +201,10 @@ class Fluid:
         for block in range(self.blocks.local_count):
             cells = self.cells(block)[: self.model.conserved].astype(np.float64)
             if covered is not None:
-                cells = np.where(self._active(covered, block), 0.0, cells)
+                cells = np.where(self.active(covered, block), 0.0, cells)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
         sums *= self._cell_volume()
-        totals = self.blocks.sum(sums.reshape(len(sums), -1))
+        totals = self.blocks.sum(sums.reshape(len(sums), 2 * self.model.conserved))
         return totals[: self.model.conserved], totals[self.model.conserved :]
 
     def left_domain(self) -> np.ndarray:
@@ -188,51 +214,59 @@ class Fluid:
         np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)
         return self.blocks.sum(sums * self._cell_volume())
 
-    def outputs(self, covered: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """Fields for the output files: (local blocks, bz, by, bx[, 3]), padded to whole blocks, NaN where covered."""
+    def outputs(self, covered: np.ndarray | None = None, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Fields for the output files: (local blocks, bz, by, bx[, 3]), padded to whole blocks, NaN where covered.
+
+        `chosen`: the local blocks wanted, by default all.
+        """
+        chosen = np.arange(self.blocks.local_count) if chosen is None else chosen
         names = ["density", "velocity", "pressure"] + (["volume_fraction"] if self.model.phases == 2 else [])
-        shape = (self.blocks.local_count, *self.blocks.block_cells[::-1])
+        shape = (len(chosen), *self.blocks.block_cells[::-1])
         fields = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in names}
         primitives, P, D = self.model.formula("primitives"), self.model.phases, self.model.dimensions
-        for block in range(self.blocks.local_count):
+        for row, block in enumerate(chosen):
             U = self.cells(block).astype(np.float64)
             W = primitives(U)
             z, y, x = U.shape[1:]
             values = {"density": U[:P].sum(axis=0), "pressure": W[P + D], "volume_fraction": U[-1]}
             for name in names:
-                part = fields[name][block, :z, :y, :x]
+                part = fields[name][row, :z, :y, :x]
                 if name == "velocity":
                     part[..., :D] = np.stack(W[P : P + D], axis=-1)
                 else:
                     part[:] = values[name]
                 if covered is not None:
-                    part[self._active(covered, block)] = np.nan
+                    part[self.active(covered, block)] = np.nan
         return fields
 
-    def check(self, time: float) -> None:
-        """Raise Diverged with place, time and state when a cell of this rank has no valid state."""
-        if not self.blocks.local_count:
-            return
-        block = int(np.argmax(~np.isfinite(self._fastest)))
-        with np.errstate(all="ignore"):
-            W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
-            c = np.asarray(self.model.formula("sound_speed")(tuple(W)))
-        bad = np.argwhere(~np.isfinite(c) | ~np.isfinite(W).all(axis=0))
-        if not len(bad):
-            return
-        z, y, x = bad[0]
-        position = [centers[i] for centers, i in zip(self.blocks.cell_centers(block), (x, y, z), strict=True)][
-            : self.model.dimensions
-        ]
-        values = ", ".join(f"{value:.6g}" for value in W[:, z, y, x])
-        place = ", ".join(f"{value:.6g}" for value in position)
-        raise Diverged(
-            f"the fluid has no valid state at t = {time:.6g} s in the cell at ({place}) m: primitives ({values})"
-        )
+    def check(self, time: float, covered: np.ndarray | None = None) -> None:
+        """Raise Diverged with place, time and state when a cell of this rank, not `covered`, has no valid state."""
+        for block in range(self.blocks.local_count):
+            with np.errstate(all="ignore"):
+                W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
+                c = np.asarray(self.model.formula("sound_speed")(tuple(W)))
+            valid = np.isfinite(c) & np.isfinite(W).all(axis=0)
+            if covered is not None:
+                valid |= self.active(covered, block)
+            if not valid.all():
+                z, y, x = np.argwhere(~valid)[0]
+                centers = zip(self.blocks.cell_centers(block), (x, y, z), strict=True)
+                place = ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
+                where = f"at t = {time:.6g} s in the cell at ({place}) m"
+                values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
+                state = ", ".join(f"{name} {value:.6g}" for name, value in values)
+                raise Diverged(f"the fluid has no valid state {where}: {state}")
 
-    def _active(self, field: np.ndarray, block: int) -> np.ndarray:
+    def _names(self) -> list[str]:
+        """Of the primitives."""
+        phases, axes = range(self.model.phases), "xyz"[: self.model.dimensions]
+        fraction = ["volume fraction"] if self.model.phases == 2 else []
+        return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), "pressure", *fraction]
+
+    def active(self, field: np.ndarray, block: int) -> np.ndarray:
+        """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
-        return field[(block, *(slice(a, a + b) for a, b in zip(g, n, strict=True)))].astype(bool)
+        return field[(block, ..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))]
 
     def _cell_volume(self) -> float:
         return float(np.prod(self.blocks.grid.spacing[: self.model.dimensions]))

@@ -34,9 +34,8 @@ class InitialState:
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
             centers = blocks.cell_centers(block)[:dimensions]
-            cells = field[
-                (block, slice(None), *(slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True)))
-            ]
+            active = (slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True))
+            cells = field[(block, slice(None), *active)]
             for region, state in zip(self.fluid.regions, states, strict=True):
                 new = state[:, None, None, None]
                 if region.shape is None:

@@ -1,7 +1,8 @@
 """The solid: smoothed particles in an updated Lagrangian frame (paper, Sec. 2.1 and Appendix A).
 
-A step needs four messages per pair of ranks that are neighbours: who needs whom, the state, the corrected stress, the new
-velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the particles.
+A step needs four messages per pair of ranks that are neighbours: who needs whom, the state, the corrected stress, the
+new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the
+particles.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from distfsi.device import cpu
 from distfsi.device.emit import plain
 from distfsi.errors import Diverged
 from distfsi.kernels import solid as kernels
-from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.parts.materials import eos_table, strength_table
@@ -34,6 +35,7 @@ DRIVERS = (
     kernels.heat,
     kernels.deform,
 )
+SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 ROOM_COLUMN = 7  # of the strength table
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
@@ -46,6 +48,7 @@ class Solid:
              plastic_strain, temperature [K], pressure [Pa], sound_speed [m/s] (n,).
              Velocities belong to half a step before the positions.
     work     (local blocks,) work [J] of the last step's external impulse
+    given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
 
     def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: cpu.Team):
@@ -70,6 +73,7 @@ class Solid:
         self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
+        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
         self._own_particles(scene)
 
     def _own_particles(self, scene: Scene) -> None:
@@ -152,6 +156,7 @@ class Solid:
         velocity = np.where(fixed, 0.0, c["velocity"] + (received + weight + impulse) / mass)
         mean = 0.5 * (c["velocity"] + velocity)
         self.work = self._per_block((impulse * mean).sum(axis=1, keepdims=True))[:, 0]
+        self.given = self._per_block_and_body(impulse)
         self._gravity_work += self._per_block((weight * mean).sum(axis=1, keepdims=True))[:, 0]
         self._boundary_impulse += self._per_block(received + weight - fixed * (received + weight + impulse))
 
@@ -191,6 +196,13 @@ class Solid:
         count = self.blocks.local_count
         return np.stack([np.bincount(self._block, v, minlength=count) for v in values.T], axis=1)
 
+    def _per_block_and_body(self, values: np.ndarray) -> np.ndarray:
+        """Sums (local blocks, bodies, k) of `values` (own, k), particle by particle in the order of their ids."""
+        bodies = self.given.shape[1]
+        group, count = self._block * bodies + self.columns["body"], self.blocks.local_count * bodies
+        sums = np.stack([np.bincount(group, v, minlength=count) for v in values.T], axis=1)
+        return sums.reshape(-1, bodies, values.shape[1])
+
     @property
     def around(self) -> dict[str, np.ndarray]:
         """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, h, key."""
@@ -220,6 +232,16 @@ class Solid:
         total = self.blocks.sum(self._per_block(values))
         return {"mass": total[0], "kinetic": total[1], "internal": total[2], "momentum": total[3:]}
 
+    def body_totals(self, body: int) -> dict[str, np.ndarray]:
+        """Collective. mass [kg], center of mass (D,) [m], momentum (D,) [N s] of a body, and the impulse (D,) [N s]
+        that the fluid gave to it in the last step."""
+        c, D = self.columns, self.dimensions
+        mass = c["mass"][:, None]
+        amounts = self._per_block_and_body(np.hstack([mass, mass * c["position"], mass * c["velocity"]]))
+        total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
+        mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
+        return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
+
     def boundary_impulse(self) -> np.ndarray:
         """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
         return self.blocks.sum(self._boundary_impulse)
@@ -228,9 +250,36 @@ class Solid:
         """Collective. Work [J] of gravity since the start."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
-    def outputs(self) -> dict[str, np.ndarray]:
-        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,)."""
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
+        return {"particles": self.columns, "sums": sums}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Collective. Go on from a snapshot, whose particles may be on any rank."""
+        self.columns = dict(snapshot["particles"])
+        self.migrate()
+        self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
+        self._gravity_work[:] = snapshot["sums"]["gravity_work"]
+
+    def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,), and the stress (n, 6)
+        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all."""
         c, D = self.columns, self.dimensions
+        c = c if chosen is None else {name: column[chosen] for name, column in c.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ("density", "pressure", "energy", "plastic_strain", "temperature", "id", "body")
-        return vectors | {name: c[name] for name in names} | {"von_mises": self._von_mises(c["deviator"].T)}
+        invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
+        return vectors | {name: c[name] for name in names} | invariant
+
+    def _cauchy_stress(self, columns: dict[str, np.ndarray]) -> np.ndarray:
+        """(n, 6) stress [Pa], tension positive; the normal stresses out of the plane share what makes the deviator's
+        trace vanish."""
+        deviator, D = columns["deviator"], self.dimensions
+        stress = np.zeros((len(deviator), 6))
+        stress[:, :D] = deviator[:, :D]
+        stress[:, D:3] = -deviator[:, :D].sum(axis=1, keepdims=True) / max(3 - D, 1)
+        stress[:, :3] -= columns["pressure"][:, None]
+        for column, component in zip(SHEARS[D], deviator[:, D:].T, strict=True):
+            stress[:, column] = component
+        return stress

@@ -6,9 +6,18 @@ At faces the velocity components are rotated so that the normal one comes first.
 
 from math import sqrt
 
-from distfsi.physics.riemann import contact_speed, einfeldt_speeds
+from distfsi.physics.riemann import contact_speed
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, GRAVITY, OMEGA_1, reference_1
+from distfsi.physics.symbols import (
+    DIMENSIONS,
+    GRAVITY,
+    OMEGA_1,
+    VARIABLES,
+    bounding_speeds,
+    contact_jump_diffusion,
+    reference_1,
+    slip_viscosity,
+)
 
 
 def primitives(U):
@@ -40,28 +49,47 @@ def sound_speed(W):
     return sqrt(slope + (p - reference + OMEGA_1 * p) / W[0])
 
 
-def face_flux(left, right):
-    """HLLC flux of (rho, rho u, rho E), normal momentum first (paper, Eqs. 17-21 with Einfeldt's speeds)."""
-    rho_l, u_l, p_l = left[0], left[1], left[1 + DIMENSIONS]
-    rho_r, u_r, p_r = right[0], right[1], right[1 + DIMENSIONS]
-    s_l, s_r = einfeldt_speeds(rho_l, u_l, sound_speed(left), rho_r, u_r, sound_speed(right))
+def behind_wave(W, s, u_face):
+    """The conserved state that a wave of speed s leaves behind when it changes the normal velocity to u_face."""
+    rho, u, p = W[0], W[1], W[1 + DIMENSIONS]
+    chi = (s - u) / (s - u_face)  # compression; 1 if no wave passes
+    mass = chi * rho
+    energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
+    return (mass, mass * u_face, *(mass * W[1 + d] for d in static_range(1, DIMENSIONS)), energy)
+
+
+def face_flux(left, right, jump):
+    """Flux of (rho, rho u, rho E), normal momentum first (paper, Eqs. 17-21; physics/riemann.py).
+
+    jump [Pa]: the largest pressure difference along the face.
+    """
+    rho_l, u_l, p_l, c_l = left[0], left[1], left[1 + DIMENSIONS], sound_speed(left)
+    rho_r, u_r, p_r, c_r = right[0], right[1], right[1 + DIMENSIONS], sound_speed(right)
+    s_l, s_r = bounding_speeds(rho_l, u_l, c_l, rho_r, u_r, c_r)
     s_star = contact_speed(rho_l, u_l, p_l, s_l, rho_r, u_r, p_r, s_r)
 
     from_left = s_star >= 0.0
-    W = tuple(left[v] if from_left else right[v] for v in static_range(DIMENSIONS + 2))
-    s = s_l if from_left else s_r
+    W = tuple(left[v] if from_left else right[v] for v in static_range(VARIABLES))
+    there = tuple(right[v] if from_left else left[v] for v in static_range(VARIABLES))
+    s, s_there = s_l if from_left else s_r, s_r if from_left else s_l
     subsonic = s_l < 0.0 if from_left else s_r > 0.0
     rho, u, p = W[0], W[1], W[1 + DIMENSIONS]
     u_face = s_star if subsonic else u
-    chi = (s - u) / (s - u_face)  # compression by the wave that reaches the face; 1 if none does
     p_face = p + rho * (s - u) * (u_face - u)
-    energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
-    mass = chi * rho * u_face
+    U, U_there = behind_wave(W, s, u_face), behind_wave(there, s_there, s_star)
+
+    reach = s if subsonic else 0.0
+    kappa = contact_jump_diffusion(reach, s_there, s_star)
+    slip = slip_viscosity(
+        U[0], reach, rho * (s - u), there[0] * (s_there - there[1]), jump, min(rho_l * c_l * c_l, rho_r * c_r * c_r)
+    )
+    F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(VARIABLES))
+    heat = 0.5 * sum(there[1 + d] * there[1 + d] - W[1 + d] * W[1 + d] for d in static_range(1, DIMENSIONS))
     return (
-        mass,
-        mass * u_face + p_face,
-        *(mass * W[1 + d] for d in static_range(1, DIMENSIONS)),
-        (energy + p_face) * u_face,
+        F[0],
+        F[1] + p_face,
+        *(F[1 + d] - slip * (there[1 + d] - W[1 + d]) for d in static_range(1, DIMENSIONS)),
+        F[1 + DIMENSIONS] + p_face * u_face - slip * heat,
     )
 
 

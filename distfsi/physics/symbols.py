@@ -35,12 +35,17 @@ OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega 
 OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
 CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
 
+LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside its two cells")
+
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
 primitives = chosen("primitives", "conserved state -> primitive state")
 conserved = chosen("conserved", "primitive state -> conserved state")
-face_flux = chosen("face_flux", "left and right primitive states, normal velocity first -> fluxes")
+face_flux = chosen("face_flux", "left and right primitive states, normal velocity first; pressure jump -> fluxes")
+bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest and fastest wave [m/s]")
+contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
+slip_viscosity = chosen("slip_viscosity", "star state, pressure jump -> momentum flux per slip at a face [kg/(m2 s)]")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
 sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
 

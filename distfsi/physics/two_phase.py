@@ -8,17 +8,21 @@ paper, Eqs. 9-30). At faces the velocity components are rotated so that the norm
 from math import sqrt
 
 from distfsi.physics.relaxation import relaxed_fraction_change
-from distfsi.physics.riemann import contact_speed, einfeldt_speeds
+from distfsi.physics.riemann import contact_speed
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
+    FLUXES,
     GRAVITY,
     MINIMUM_FRACTION,
     OMEGA_1,
     OMEGA_2,
     VARIABLES,
+    bounding_speeds,
+    contact_jump_diffusion,
     reference_1,
     reference_2,
+    slip_viscosity,
 )
 
 
@@ -70,6 +74,11 @@ def sound_speed(W):
     return sqrt((a1 * bulk1 + a2 * bulk2) / (a1 * W[0] + a2 * W[1]))
 
 
+def mixture_density(W):
+    """rho = a1 rho1 + a2 rho2 [kg/m3]."""
+    return W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
+
+
 def energy_behind_wave(rho, p, chi, reference, reference_behind, OMEGA):
     """rho e of one phase behind a wave that compresses it by chi: the phase's own Hugoniot (in place of Eq. 27).
 
@@ -81,42 +90,73 @@ def energy_behind_wave(rho, p, chi, reference, reference_behind, OMEGA):
     return (p_behind - reference_behind) / OMEGA
 
 
-def face_flux(left, right):
-    """HLLC fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27)."""
-    rho_l = left[3 + DIMENSIONS] * left[0] + (1.0 - left[3 + DIMENSIONS]) * left[1]
-    rho_r = right[3 + DIMENSIONS] * right[0] + (1.0 - right[3 + DIMENSIONS]) * right[1]
-    s_l, s_r = einfeldt_speeds(rho_l, left[2], sound_speed(left), rho_r, right[2], sound_speed(right))
-    s_star = contact_speed(rho_l, left[2], left[2 + DIMENSIONS], s_l, rho_r, right[2], right[2 + DIMENSIONS], s_r)
+def behind_wave(W, s, u_face):
+    """All that is transported, per volume, behind a wave of speed s that changes the normal velocity to u_face.
 
-    from_left = s_star >= 0.0
-    W = tuple(left[v] if from_left else right[v] for v in static_range(VARIABLES))
-    rho = rho_l if from_left else rho_r
-    s = s_l if from_left else s_r
-    subsonic = s_l < 0.0 if from_left else s_r > 0.0
-    u, p, a1 = W[2], W[2 + DIMENSIONS], W[3 + DIMENSIONS]
+    The stored state, both phase energies, and 1 for the volume itself.
+    """
+    a1, u, p = W[3 + DIMENSIONS], W[2], W[2 + DIMENSIONS]
     a2 = 1.0 - a1
-    u_face = s_star if subsonic else u
-    chi = (s - u) / (s - u_face)  # compression by the wave that reaches the face; 1 if none does
-    p_face = p + rho * (s - u) * (u_face - u)
+    rho = a1 * W[0] + a2 * W[1]
+    chi = (s - u) / (s - u_face)  # compression; 1 if no wave passes
     energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
     rho1, rho2 = chi * W[0], chi * W[1]
     before1, slope1 = reference_1(W[0])
     before2, slope2 = reference_2(W[1])
     behind1, slope1b = reference_1(rho1)
     behind2, slope2b = reference_2(rho2)
-    mass1 = a1 * rho1 * u_face
-    mass2 = a2 * rho2 * u_face
+    mass1, mass2 = a1 * rho1, a2 * rho2
     mass = mass1 + mass2
     return (
         mass1,
         mass2,
-        mass * u_face + p_face,
+        mass * u_face,
         *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
-        (energy + p_face) * u_face,
-        a1 * u_face,
-        a1 * energy_behind_wave(W[0], p, chi, before1, behind1, OMEGA_1) * u_face,
-        a2 * energy_behind_wave(W[1], p, chi, before2, behind2, OMEGA_2) * u_face,
-        u_face,
+        energy,
+        a1,
+        a1 * energy_behind_wave(W[0], p, chi, before1, behind1, OMEGA_1),
+        a2 * energy_behind_wave(W[1], p, chi, before2, behind2, OMEGA_2),
+        1.0,
+    )
+
+
+def face_flux(left, right, jump):
+    """Fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27).
+
+    Everything is smeared alike (physics/riemann.py), so that pressure and velocity stay uniform across an interface.
+    jump [Pa]: the largest pressure difference along the face.
+    """
+    rho_l, u_l, p_l, c_l = mixture_density(left), left[2], left[2 + DIMENSIONS], sound_speed(left)
+    rho_r, u_r, p_r, c_r = mixture_density(right), right[2], right[2 + DIMENSIONS], sound_speed(right)
+    s_l, s_r = bounding_speeds(rho_l, u_l, c_l, rho_r, u_r, c_r)
+    s_star = contact_speed(rho_l, u_l, p_l, s_l, rho_r, u_r, p_r, s_r)
+
+    from_left = s_star >= 0.0
+    W = tuple(left[v] if from_left else right[v] for v in static_range(VARIABLES))
+    there = tuple(right[v] if from_left else left[v] for v in static_range(VARIABLES))
+    rho, rho_there = rho_l if from_left else rho_r, rho_r if from_left else rho_l
+    s, s_there = s_l if from_left else s_r, s_r if from_left else s_l
+    subsonic = s_l < 0.0 if from_left else s_r > 0.0
+    u, p = W[2], W[2 + DIMENSIONS]
+    u_face = s_star if subsonic else u
+    p_face = p + rho * (s - u) * (u_face - u)
+    U, U_there = behind_wave(W, s, u_face), behind_wave(there, s_there, s_star)
+
+    reach = s if subsonic else 0.0
+    kappa = contact_jump_diffusion(reach, s_there, s_star)
+    slip = slip_viscosity(
+        U[0] + U[1], reach, rho * (s - u), rho_there * (s_there - there[2]), jump,
+        min(rho_l * c_l * c_l, rho_r * c_r * c_r),
+    )  # fmt: skip
+    F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(FLUXES))
+    heat = 0.5 * sum(there[2 + d] * there[2 + d] - W[2 + d] * W[2 + d] for d in static_range(1, DIMENSIONS))
+    return (
+        F[0],
+        F[1],
+        F[2] + p_face,
+        *(F[2 + d] - slip * (there[2 + d] - W[2 + d]) for d in static_range(1, DIMENSIONS)),
+        F[2 + DIMENSIONS] + p_face * u_face - slip * heat,
+        *(F[v] for v in static_range(3 + DIMENSIONS, FLUXES)),
     )
 
 

@@ -47,7 +47,7 @@ def build_domain(given: DomainInput) -> Domain:
 
 def build_time(given: TimeInput) -> Time:
     """End and step size."""
-    return Time(given.end, given.cfl, given.maximum_steps)
+    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme)
 
 
 def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
@@ -64,7 +64,9 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         )
         for axis in AXES[:dimensions]
     )
-    return Fluid(phases, regions, given.reconstruction, given.minimum_volume_fraction, inflow, given.precision)
+    return Fluid(
+        phases, regions, given.reconstruction, given.minimum_volume_fraction, inflow, given.precision, given.riemann
+    )
 
 
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:
@@ -100,7 +102,17 @@ def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:
         ambient, arrival = given.peaks.ambient_pressure, given.peaks.arrival_overpressure
         ambient = fluid.regions[0].state.pressure if ambient is None else ambient
         peaks = Peaks(ambient, ARRIVAL * abs(ambient) if arrival is None else arrival)
-    return Output(given.directory or f"out/{stem}", given.fields_every, given.history_every, peaks, given.schlieren)
+    directory = given.directory or f"out/{stem}"
+    return Output(
+        directory,
+        given.fields_every,
+        given.history_every,
+        peaks,
+        given.schlieren,
+        given.hdf5,
+        given.restart_every,
+        given.stop_file or f"{directory}/stop",
+    )
 
 
 def build_gauges(given: Mapping[str, GaugeInput], end: float, bodies: Sequence[str]) -> tuple[Gauge, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
@@ -29,6 +30,7 @@ from distfsi.scene.shapes import bounding_box, contains
 from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
+FILE_NAME = re.compile(r"[\w-]+")
 CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
 
 
@@ -184,6 +186,8 @@ def check_gauges(
     """Gauges have something to measure, inside the domain."""
     for name, gauge in given.items():
         path = ("gauges", name)
+        if not FILE_NAME.fullmatch(name):
+            yield Fault(path, "is no name for a file; expected letters, digits, - and _")
         material = "solid" if isinstance(gauge, ParticleGauge | BodyGauge) else "fluid"
         if material not in present:
             yield Fault((*path, "kind"), f"'{gauge.kind}' needs a {material}")

@@ -8,6 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+Hdf5 = Literal["mpi-io", "mpio", "gather"]
+RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
+Scheme = Literal["rk2", "rk3"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
 
@@ -119,6 +122,7 @@ class Fluid:
     minimum_volume_fraction: float
     inflow: tuple[tuple[FluidState | None, FluidState | None], ...]  # per axis, per side
     precision: Literal["float64", "float32"]
+    riemann: RiemannSolver = "hllc"
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -230,11 +234,17 @@ class Domain:
 
 @dataclass(frozen=True)
 class Time:
-    """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d."""
+    """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
+
+    `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
+    `wall_clock_limit` [s] of computing.
+    """
 
     end: float
     cfl: float
     maximum_steps: int | None
+    wall_clock_limit: float | None = None
+    scheme: Scheme = "rk3"
 
 
 @dataclass(frozen=True)
@@ -250,7 +260,9 @@ class Peaks:
 class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
-    `peaks` (None: not kept) and `schlieren` are written with the cells.
+    `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
+    is by a file called `stop_file`.
     """
 
     directory: str
@@ -258,6 +270,9 @@ class Output:
     history_every: int
     peaks: Peaks | None = None
     schlieren: bool = False
+    hdf5: Hdf5 = "mpi-io"
+    restart_every: float = 0.0
+    stop_file: str = "stop"
 
 
 # ---- gauges: each samples `every` so many seconds, 0: at each step --------------------------------------------------

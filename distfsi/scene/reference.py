@@ -1,7 +1,9 @@
-"""The reference of the input, written from the schema: `python -m distfsi.scene.reference > docs/input.md`."""
+"""The reference of the input, written from the schema: `python -m distfsi.scene.reference > docs/input.md`; and the
+schema itself for editors: `python -m distfsi schema > docs/distfsi.schema.json`."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -58,6 +60,12 @@ def markdown() -> str:
         for name in names:
             lines += [definitions[name]["description"], "", *_table(definitions[name]), ""]
     return "\n".join(lines)
+
+
+def json_schema() -> str:
+    """The JSON schema of the input as text."""
+    named = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "distfsi input"}
+    return json.dumps(schema() | named, indent=1, ensure_ascii=False) + "\n"
 
 
 def _table(definition: Json) -> Iterator[str]:

@@ -50,7 +50,11 @@ class TimeInput(Table):
 
     end: quantity("s", gt=0.0) = Field(description="end time")
     cfl: quantity("1", gt=0.0, le=1.0) = Field(0.5, description="dt as a fraction of the largest stable one")
+    scheme: description.Scheme = Field("rk3", description="strong-stability-preserving Runge-Kutta method")
     maximum_steps: Count | None = Field(None, description="stop after so many steps")
+    wall_clock_limit: quantity("s", gt=0.0) | None = Field(
+        None, description="computing time after which the run stops early with a restart file, exit code 75"
+    )
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
@@ -98,6 +102,9 @@ class FluidInput(Table):
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: Literal["first_order", "minmod", "van_leer"] = Field("minmod", description="slopes of MUSCL")
+    riemann: description.RiemannSolver = Field(
+        "hllc", description='flux; "adaptive": "hllc" with shear along strong shocks, against carbuncles'
+    )
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region"
     )
@@ -156,7 +163,17 @@ class OutputInput(Table):
         Field(None, description="true or a table: also write what the cells remember of a blast")
     )
     schlieren: bool = Field(
-        False, strict=True, description="also write the size of the density gradient over its largest value at the time; 2D and 3D"
+        False, strict=True, description="also write the slope of the density over its largest value; 2D and 3D"
+    )
+    hdf5: description.Hdf5 = Field(
+        "mpi-io",
+        description='who writes: all ranks by MPI-IO, all ranks by an h5py with MPI ("mpio"), or rank 0 ("gather")',
+    )
+    restart_every: quantity("s", ge=0.0) = Field(
+        1800.0, description="computing time between restart files, of which two are kept; 0: only when stopped early"
+    )
+    stop_file: str | None = Field(
+        None, description="a file that, when it appears, stops the run early; default: stop in the output directory"
     )
 
 
@@ -168,7 +185,7 @@ HUNDREDTH = "time between samples; default a hundredth of the run"
 
 
 class PointGauge(Table):
-    """The fluid at a point: out/gauges/NAME.csv.
+    """The fluid at a point: pressure, density, velocity and, with two phases, volume fraction in gauges/NAME.csv.
 
     Values are linear between cell centers; covered cells do not count, and in a covered cell there is no value (nan).
     """
@@ -189,7 +206,7 @@ class LineGauge(Table):
 
 
 class PlaneGauge(Table):
-    """The layer of cells that a plane passes through, as field files in out/gauges/NAME/; 2D and 3D."""
+    """The layer of cells that a plane passes through, as field files in gauges/NAME/; 2D and 3D."""
 
     kind: Literal["plane"]
     axis: Literal["x", "y", "z"] = Field(description="axis that the plane is normal to")
@@ -198,7 +215,7 @@ class PlaneGauge(Table):
 
 
 class ParticleGauge(Table):
-    """A particle of a body: out/gauges/NAME.csv. Velocities are those of half a step before."""
+    """A particle of a body, wherever it goes: all its fields. Velocities are those of half a step before."""
 
     kind: Literal["particle"]
     body: str = Field(description="name of the body")
@@ -207,7 +224,8 @@ class ParticleGauge(Table):
 
 
 class BodyGauge(Table):
-    """A body as a whole: motion of its center of mass, momentum, and the fluid's mean force on it in the last step."""
+    """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
+    mass, momentum."""
 
     kind: Literal["body"]
     body: str = Field(description="name of the body")
@@ -215,7 +233,6 @@ class BodyGauge(Table):
 
 
 GaugeInput = Annotated[PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge, Field(discriminator="kind")]
-GaugeName = Annotated[str, Field(pattern=r"^[\w-]+$")]
 
 
 class PerformanceInput(Table):
@@ -234,7 +251,7 @@ class Sections(Table):
     fluid: FluidInput | None = None
     solid: SolidInput | None = None
     output: OutputInput = OutputInput()
-    gauges: dict[GaugeName, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
+    gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     performance: PerformanceInput = PerformanceInput()
 
 

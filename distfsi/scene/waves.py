@@ -1,4 +1,4 @@
-"""How fast waves run when two fluid states meet: the exact Riemann problem for any of the input's equations of state.
+"""What forms when two fluid states meet: the exact Riemann problem for any of the input's equations of state.
 
 p = p_cold(rho) + G rho (e - e_cold(rho)); shocks by the Rankine-Hugoniot conditions, rarefactions along isentropes.
 """
@@ -27,27 +27,41 @@ class Side(NamedTuple):
     pressure: float
     velocity: float
 
+    @property
+    def sound(self) -> float:
+        """Speed of sound [m/s]."""
+        return _sound_speed(self.eos, self.density, self.pressure)
 
-def fastest_signal(left: Side, right: Side) -> float:
-    """Largest |u| + c [m/s] in the two states and in those that form between them.
 
-    States of tension, and such that leave a vacuum between them, count as they are.
+class Wave(NamedTuple):
+    """A state that forms: velocity and speed of sound [m/s]."""
+
+    velocity: float
+    sound: float
+
+
+def meet(left: Side, right: Side) -> list[Wave]:
+    """The two states and those that form between them, from left to right; velocities point to the right.
+
+    Between states of tension, and such that leave a vacuum between them, nothing is told.
     """
-    fastest = max(abs(side.velocity) + sound_speed(side.eos, side.density, side.pressure) for side in (left, right))
+    outer = Wave(left.velocity, left.sound), Wave(-right.velocity, right.sound)
     low, high = LOWEST * min(left.pressure, right.pressure), HIGHEST * max(left.pressure, right.pressure)
     if low <= 0.0:
-        return fastest
+        return list(outer)
 
     def approach(logarithm: float) -> float:
         return sum(side.velocity - _behind(side, exp(logarithm))[1] for side in (left, right))
 
     if approach(log(low)) <= 0.0 or approach(log(high)) >= 0.0:
-        return fastest
+        return list(outer)
     p = exp(brentq(approach, log(low), log(high), xtol=1e-6))
-    for side in (left, right):
-        density, change = _behind(side, p)
-        fastest = max(fastest, abs(side.velocity - change) + sound_speed(side.eos, density, p))
-    return fastest
+    inner = [_behind(side, p) for side in (left, right)]
+    velocity = left.velocity - inner[0][1]
+    between = [
+        Wave(velocity, _sound_speed(side.eos, rho, p)) for side, (rho, _) in zip((left, right), inner, strict=True)
+    ]
+    return [outer[0], *between, outer[1]]
 
 
 def _behind(side: Side, p: float) -> tuple[float, float]:
@@ -77,13 +91,13 @@ def _rarefaction(side: Side, p: float) -> tuple[float, float]:
     for _ in range(ISENTROPE_STEPS):
         there = here * ratio
         middle = sqrt(here * there)
-        half = rho + (middle - here) / sound_speed(side.eos, rho, here) ** 2
-        c = sound_speed(side.eos, half, middle)
+        half = rho + (middle - here) / _sound_speed(side.eos, rho, here) ** 2
+        c = _sound_speed(side.eos, half, middle)
         change += (there - here) / (half * c)
         rho, here = rho + (there - here) / c**2, there
     return rho, change
 
 
-def sound_speed(eos: FluidEos, density: float, p: float) -> float:
+def _sound_speed(eos: FluidEos, density: float, p: float) -> float:
     """Speed of sound [m/s]; where there is none, next to nothing."""
     return sqrt(max(sound_speed_squared(eos, density, p), 1e-30))

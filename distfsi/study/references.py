@@ -134,3 +134,103 @@ FLYER_PLATES = (
     FlyerPlate(STEEL_DENSITY, STEEL, 1000.0, 20.80e9, 5314.0, 1.1039),
 )
 """Symmetric impact without strength by the jump conditions: u = velocity/2, U = c0 + s1 u, p = rho U u, e = u^2/2."""
+
+
+class BubbleVelocities(NamedTuple):
+    """Velocities [m/s] when a shock of Mach 1.22 in air hits a cylinder of helium 50 mm in diameter.
+
+    Vs incident, VR refracted, VT transmitted shock; Vui, Vdi upstream and downstream interface at first; Vj the jet,
+    which is the upstream interface on the axis later on; Vuf the rearmost helium in the end. None: not told.
+    """
+
+    source: str
+    Vs: float | None
+    VR: float | None
+    VT: float | None
+    Vui: float | None
+    Vdi: float | None
+    Vj: float | None
+    Vuf: float | None
+
+
+SHOCK_BUBBLE = (
+    BubbleVelocities("experiment", 410.0, 900.0, 393.0, 170.0, 145.0, 230.0, 113.0),
+    BubbleVelocities("Quirk-Karni", 422.0, 943.0, 377.0, 178.0, 146.0, 227.0, None),
+    BubbleVelocities("AMR 5120", 423.2, 953.0, 381.2, None, 141.5, 222.9, None),
+    BubbleVelocities("the paper", None, None, None, None, 154.0, 252.0, None),
+)
+"""Haas and Sturtevant, J. Fluid Mech. 181 (1987) 41, +-10 %; Quirk and Karni, J. Fluid Mech. 318 (1996) 129; a
+two-phase computation on 5120 x 1024 cells with the samurai library; in all three the helium holds 28 % of air by mass:
+density 0.182 of that of air, gamma 1.645 to 1.648. Last the paper's Table 1: pure helium, 0.138 and 1.67."""
+
+
+class MeshSpeed(NamedTuple):
+    """A row of the paper's Table 2: cell size [mm], nodes, and steps per second on an RTX 4090; and its true number of
+    cells: the nodes are those of a mesh one cell thick, 2 (nx + 1)(ny + 1), over 325 x 90 mm."""
+
+    spacing: float
+    nodes: int
+    steps_per_second: float
+    cells: int
+
+
+SHOCK_BUBBLE_SPEEDS = (
+    MeshSpeed(1.0, 59_332, 174.0, 29_250),
+    MeshSpeed(0.5, 235_661, 64.6, 117_000),
+    MeshSpeed(0.25, 939_322, 14.40, 468_000),
+    MeshSpeed(0.125, 3_750_642, 4.30, 1_872_000),
+)
+"""The steps per second may be pictures per second: the times that the same table gives for 100 steps are 70 times as
+long."""
+
+
+class RadialProfile(NamedTuple):
+    """A cylindrical explosion of gas in water at one time [s]: radius of the charge, of the shock and of the gas [m],
+    and points (radius [m], pressure [Pa], radial velocity [m/s], density [kg/m3])."""
+
+    charge: float
+    time: float
+    shock: float
+    interface: float
+    points: tuple[tuple[float, float, float, float], ...]
+
+
+UNDEX_2D = (
+    RadialProfile(0.5, 0.05e-3, 0.6796, 0.5574, ()),
+    RadialProfile(
+        0.5,
+        0.1e-3,
+        0.849,
+        0.6168,
+        (
+            (0.1, 7810.0e6, 0.0, 1630.0),
+            (0.2, 7810.0e6, 0.0, 1630.0),
+            (0.3, 5601.0e6, 572.4, 1285.7),
+            (0.4, 3284.0e6, 1367.5, 878.0),
+            (0.5, 3290.9e6, 1265.0, 879.2),
+            (0.6, 3280.9e6, 1204.0, 877.2),
+            (0.7, 3235.2e6, 1083.7, 1380.3),
+            (0.8, 3148.5e6, 977.7, 1389.7),
+            (0.9, 0.1e6, 0.0, 1000.0),
+        ),
+    ),
+    RadialProfile(0.4, 0.05e-3, 0.5782, 0.4577, ()),
+    RadialProfile(
+        0.4,
+        0.1e-3,
+        0.745,
+        0.5174,
+        (
+            (0.1, 7810.0e6, 0.0, 1630.0),
+            (0.2, 5448.0e6, 603.6, 1260.3),
+            (0.3, 3038.7e6, 1435.8, 830.5),
+            (0.4, 3093.3e6, 1287.1, 841.2),
+            (0.5, 3112.1e6, 1208.2, 844.8),
+            (0.6, 3081.8e6, 1068.3, 1371.9),
+            (0.7, 2994.4e6, 949.1, 1383.1),
+        ),
+    ),
+)
+"""The underwater explosion of the paper's Sec. 5.2 (gas 1.4, 1630 kg/m3, 7.81 GPa; water 4.4, 0.6 GPa): an independent
+radial Lagrangian computation (Godunov, exact interfaces, 2000 cells per metre; half of them change positions by 0.1 %,
+the highest pressure by 1 %)."""

@@ -1,0 +1,63 @@
+"""What is known of a run as a whole: what it computes, by whom, how it ended; `run.json` beside its results."""
+
+from __future__ import annotations
+
+import json
+import time as clock
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from distfsi import __version__
+from distfsi.errors import DistfsiError, Diverged, Stopped
+from distfsi.output.interfaces import Communicator
+from distfsi.output.storage import replace
+
+NAME = "run.json"
+ENDINGS = {Stopped: "stopped", Diverged: "diverged"}
+
+
+class Journal:
+    """Rank 0 notes that a run goes on, within a `with` block, and how it ended, after it.
+
+    A journal that cannot be written is no reason to end a run.
+    """
+
+    def __init__(self, directory: Path, scene: Any, communicator: Communicator, threads: int):
+        self._path, self._writes = Path(directory) / NAME, communicator.rank == 0
+        self._started = clock.monotonic()
+        self._notes = {
+            "title": scene.title,
+            "end time [s]": scene.time.end,
+            "distfsi": __version__,
+            "ranks": communicator.size,
+            "threads per rank": threads,
+            "started": clock.strftime("%Y-%m-%d %H:%M:%S"),
+            "status": "running",
+        }
+
+    def __enter__(self) -> Journal:
+        self._write()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _) -> None:
+        status = "done" if kind is None else ENDINGS.get(kind, "failed")
+        self._notes |= {"status": status, "seconds": round(clock.monotonic() - self._started, 1)}
+        if error is not None:
+            self._notes["message"] = str(error) if isinstance(error, DistfsiError) else f"{kind.__name__}: {error}"
+        self._write()
+
+    def _write(self) -> None:
+        if self._writes:
+            with suppress(OSError):
+                temporary = self._path.with_name(NAME + ".tmp")
+                temporary.write_text(json.dumps(self._notes, indent=1) + "\n")
+                replace(temporary, self._path)
+
+
+def read_journal(directory: Path) -> dict[str, Any]:
+    """The notes of the last run in a directory; empty without any."""
+    try:
+        return json.loads((Path(directory) / NAME).read_text())
+    except (OSError, ValueError):
+        return {}

@@ -1,0 +1,179 @@
+"""Maps: fields over a plane as colors, particles as discs on top. Lengths on paper are in inches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import FigureBase
+
+from distfsi.output.frames import AXES, Frame
+from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
+from distfsi.output.progress import format_time
+from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
+
+COLORS = {"density": "bone_r", "schlieren": "gray_r"}  # others: OTHER_COLORS
+OTHER_COLORS, PARTICLE_COLORS = "viridis", "plasma"
+SUMMARY = ("pressure", "density")  # the fields of a summary
+BAR_RIGHT, BAR_BELOW = 1.1, 0.75  # room for a color bar beside or below panels
+HIGHEST = 11.0  # all rows of panels together
+UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps stand side by side
+DISC = 1.25  # diameter over the distance of particles: discs of a body leave no gaps
+
+
+@dataclass(frozen=True)
+class Colors:
+    """How the field `name` becomes colors: values over `size`, the unit of the `label`, by `map`."""
+
+    name: str
+    size: float
+    label: str
+    map: ScalarMappable
+
+
+def values(columns: Mapping[str, np.ndarray], name: str, axes: int) -> np.ndarray:
+    """A field with one value per place, `axes` axes of them; of a vector its magnitude, also under the name "speed"."""
+    array = columns["velocity" if name == "speed" and name not in columns else name]
+    return array if array.ndim == axes else np.linalg.norm(array, axis=-1)
+
+
+def cell_colors(name: str, arrays: Sequence[np.ndarray]) -> Colors:
+    """Colors of a field of the cells, for these values; logarithmic where they span decades."""
+    size, unit = scaled(UNITS.get(name, ""), largest(arrays))
+    norm = norm_of([array / size for array in arrays])
+    return Colors(name, size, label_of(name, unit), ScalarMappable(norm, COLORS.get(name, OTHER_COLORS)))
+
+
+def particle_colors(name: str, arrays: Sequence[np.ndarray]) -> Colors:
+    """Colors of a field of the particles, for these values, from zero on where they have one sign."""
+    size, unit = scaled(UNITS.get(name, ""), largest(arrays))
+    finite = np.concatenate([array[np.isfinite(array)] for array in arrays]) / size
+    low, high = finite.min(initial=0.0), finite.max(initial=0.0)
+    norm = Normalize(low, high if high > low else low + 1.0)
+    return Colors(name, size, label_of(name, unit), ScalarMappable(norm, PARTICLE_COLORS))
+
+
+def summary_colors(frames: Sequence[Frame]) -> tuple[list[Colors], Colors | None]:
+    """Pressure and density of the cells; of the particles plastic strain or, where nothing has yielded, the speed."""
+    present = [name for name in SUMMARY if name in frames[0].cells]
+    fields = [cell_colors(name, [values(frame.cells, name, 2) for frame in frames]) for name in present]
+    if not any(len(frame.particles.get("position", ())) for frame in frames):
+        return fields, None
+    strained = largest(frame.particles.get("plastic_strain", np.zeros(0)) for frame in frames) > 0.0
+    name = "plastic_strain" if strained else "speed"
+    return fields, particle_colors(name, [values(frame.particles, name, 1) for frame in frames])
+
+
+# ---- sheets ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Places of the maps of some fields (or of particles alone) at some times: side by side, or where domains are wide
+    one below the other."""
+
+    aspect: float
+    fields: int
+    times: int
+    particles: bool
+    width: float = WIDTH
+    highest: float = HIGHEST
+
+    @property
+    def upright(self) -> bool:
+        """Whether each field has a row, and not a column."""
+        return self.aspect > UPRIGHT_ASPECT
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of panels."""
+        rows = max(self.fields, 1)
+        return (rows, self.times) if self.upright else (self.times, rows)
+
+    @property
+    def _bars(self) -> tuple[bool, bool]:
+        """Whether color bars stand beside and below the panels."""
+        bars = self.fields > 0, self.particles
+        return bars if self.upright else bars[::-1]
+
+    @property
+    def _panel_width(self) -> float:
+        columns = self.shape[1]
+        return (self.width - LEFT - self._right - (columns - 1) * GAP) / columns
+
+    @property
+    def _right(self) -> float:
+        return BAR_RIGHT if self._bars[0] else 0.3
+
+    @property
+    def panel(self) -> tuple[float, float]:
+        """Width and height of a panel."""
+        width = min(self._panel_width, self.highest / self.shape[0] / self.aspect)
+        return width, width * self.aspect
+
+    @property
+    def margins(self) -> tuple[float, float, float, float]:
+        """Left, right, below, above; what the panels leave of the width goes to both sides."""
+        spare = 0.5 * self.shape[1] * (self._panel_width - self.panel[0])
+        return LEFT + spare, self._right + spare, XLABEL + BAR_BELOW * self._bars[1], TITLE
+
+    @property
+    def height(self) -> float:
+        """Of the whole sheet."""
+        rows = self.shape[0]
+        return rows * self.panel[1] + (rows - 1) * (TITLE + 0.1) + sum(self.margins[2:])
+
+
+def draw_maps(
+    figure: FigureBase, sheet: Sheet, frames: Sequence[Frame], fields: Sequence[Colors], particles: Colors | None
+) -> None:
+    """Each field at each time, particles on top."""
+    grid = grid_of_panels(figure, *sheet.shape, sheet.margins, (GAP, TITLE + 0.1), sharex=True, sharey=True)
+    by_field = grid if sheet.upright else grid.T
+    left, right, bottom, top = frames[0].extent
+    length, metres = scaled("m", max(right - left, top - bottom))
+    sides = ("right", "below") if sheet.upright else ("below", "right")
+    for axes, colors in zip(by_field, fields, strict=len(fields) > 0):
+        _draw_field(axes, frames, colors, length)
+        draw_bar(figure, axes, colors.map, colors.label, sides[0])
+    for axes in by_field:
+        for panel, frame in zip(axes, frames, strict=True):
+            panel.set(title=f"t = {format_time(frame.time)}")
+            if particles:
+                _draw_particles(panel, frame, particles, length)
+    if particles:
+        draw_bar(figure, by_field.ravel(), particles.map, particles.label, sides[1])
+    grid[0, 0].set(xlim=(left / length, right / length), ylim=(bottom / length, top / length))
+    horizontal, vertical = (AXES[axis] for axis in frames[0].axes)
+    for panel in grid[-1]:
+        panel.set_xlabel(f"{horizontal} [{metres}]")
+    for panel in grid[:, 0]:
+        panel.set_ylabel(f"{vertical} [{metres}]")
+
+
+def _draw_field(axes: Iterable[Axes], frames: Sequence[Frame], colors: Colors, length: float) -> None:
+    for panel, frame in zip(axes, frames, strict=True):
+        image = np.ma.masked_invalid(values(frame.cells, colors.name, 2) / colors.size)
+        extent = [place / length for place in frame.extent]
+        panel.imshow(image, origin="lower", extent=extent, norm=colors.map.norm, cmap=colors.map.cmap, aspect="auto")
+
+
+def _draw_particles(panel: Axes, frame: Frame, colors: Colors, length: float) -> None:
+    positions = frame.particles["position"][:, list(frame.axes)] / length
+    diameters = np.full(len(positions), DISC * frame.spacing / length)
+    discs = EllipseCollection(
+        diameters,
+        diameters,
+        np.zeros(len(positions)),
+        units="xy",
+        offsets=positions,
+        offset_transform=panel.transData,
+        facecolors=colors.map.to_rgba(values(frame.particles, colors.name, 1) / colors.size),
+        linewidths=0.0,
+    )
+    panel.add_collection(discs)

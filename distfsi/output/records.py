@@ -1,0 +1,69 @@
+"""All that a run writes into its output directory, each thing when it is due."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from distfsi.output.fields import FieldWriter
+from distfsi.output.history import History
+from distfsi.output.restart import Restart, RestartWriter, Snapshot
+from distfsi.output.schedule import Every
+from distfsi.output.storage import Storage
+
+
+class Records:
+    """Field files, history and restart files of a run; at a restart those up to `origin` are continued.
+
+    What a run that died has written after the restart file is removed first, so that in the end the files are those of
+    a run that was never interrupted.
+    """
+
+    def __init__(self, simulation, accounts, storage: Storage, origin: Restart | None):
+        """Collective. `accounts` gives the history its columns and rows. Raises OutputError on all ranks."""
+        scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator
+        directory = Path(scene.output.directory)
+        time, step = (origin.time, origin.step) if origin else (None, None)
+        # Without its restart files first: they need the other files.
+        self._restarts = RestartWriter(directory, scene, blocks, communicator, storage, step)
+        self._fields = FieldWriter(directory, blocks, communicator, storage, time)
+        self._history = History(directory / "history.csv", accounts.columns, communicator, step)
+        self._simulation, self._accounts, self._directory = simulation, accounts, directory
+        self._fields_due, self._frame = Every(scene.output.fields_every), 0
+        self._written_at = -1.0
+        self._restart = origin.path if origin else None
+
+    def write(self, always: bool = False) -> None:
+        """Write what is due at the simulation's time, or fields and history `always`."""
+        simulation = self._simulation
+        if self._fields_due.due(simulation.time) or always:
+            self.write_fields()
+        if simulation.steps % simulation.scene.output.history_every == 0 or always:
+            self._history.append(self._accounts.row(simulation))
+
+    def write_fields(self) -> None:
+        """Write the fields, if they are not those written last."""
+        simulation = self._simulation
+        if simulation.time > self._written_at:
+            self._fields.write(self._frame, simulation.time, *simulation.outputs())
+            self._frame, self._written_at = self._frame + 1, simulation.time
+
+    def write_restart(self, snapshots: Mapping[str, Snapshot]) -> Path:
+        """Write a restart file; its path."""
+        self._restart = self._restarts.write(self._simulation.steps, snapshots)
+        return self._restart
+
+    def left_behind(self) -> str:
+        """What an invalid state has left, in words."""
+        last = f"the last restart file is {self._restart}" if self._restart else "there is no restart file"
+        return f"the state is in the last field files in {self._directory}; {last}"
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        return {"values": {"frame": np.array(self._frame), "fields_due": np.array(self._fields_due.next)}}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._frame, self._fields_due.next = int(snapshot["values"]["frame"]), float(snapshot["values"]["fields_due"])

@@ -1,0 +1,211 @@
+"""What a scene pays for and does not use, and what looks wrong, as advice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.signals import COVERED, Layout, fastest_signal, states
+
+AXES, ENDS = "xyz", ("low", "high")
+BEST_SPACING = 0.5  # of a fluid cell
+FEWEST_PARTICLES = 4  # through a body's thickness
+MOST_CELLS = 500  # across the smallest thing
+UNREACHED = 0.25  # of the domain's length that no wave reaches
+
+
+def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
+    """One sentence for each thing that may be worth a change; `layout` is that of the scene's fluid, if it has one."""
+    yield from _shape_of_cells(scene.domain)
+    if scene.output.fields_every > scene.time.end:
+        yield "output.fields_every is longer than the run: only the first and the last fields are written"
+    if layout:
+        yield from _absent_phases(scene.fluid, layout)
+        yield from _unreached_ends(scene, layout)
+    for body in _bodies(scene):
+        for text in _body(body, scene.domain, scene.fluid is not None):
+            yield f"body '{body.name}': {text}"
+    yield from _excess_cells(scene)
+    yield from _excess_dimensions(scene)
+
+
+def _shape_of_cells(domain: Domain) -> Iterator[str]:
+    longest, shortest = max(domain.spacing), min(domain.spacing)
+    if longest > 1.5 * shortest:
+        yield f"cells are {longest / shortest:.3g} times longer than wide"
+
+
+# ---- what nothing is in ----------------------------------------------------------------------------------------------
+
+
+def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
+    """Phases that no region has, or only such regions as later ones or bodies hide."""
+    seen = set(np.unique(layout.region)) - {COVERED}
+    present = {fluid.regions[number].state.phase for number in seen}
+    present |= {state.phase for sides in fluid.inflow for state in sides if state}
+    named = {state.phase for state in states(fluid)}
+    for number, phase in enumerate(fluid.phases):
+        if number not in named:
+            yield f"phase '{phase.name}' is nowhere; without it the run is cheaper"
+        elif number not in present:
+            yield f"phase '{phase.name}' fills no cell: later regions or bodies hide it, or its region lies outside"
+
+
+def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
+    """Ends of the domain that even the fastest wave does not come near."""
+    domain = scene.domain
+    if any(scene.gravity) or any(state for sides in scene.fluid.inflow for state in sides):
+        return
+    sources = _sources(scene, layout)
+    if sources is None:
+        yield "nothing moves and no two states meet: the fluid stays as it is"
+        return
+    reach = fastest_signal(scene, layout) * scene.time.end
+    for axis, (low, high) in enumerate(zip(*sources, strict=True)):
+        length = domain.upper[axis] - domain.lower[axis]
+        for side, gap in enumerate((low - domain.lower[axis], domain.upper[axis] - high)):
+            rest = gap - reach
+            if rest > UNREACHED * length and domain.boundaries[axis][side] != "periodic":
+                place = f"the {ENDS[side]} {AXES[axis]} end"
+                nearest = f"no wave comes nearer to {place} than {rest:.3g} m before the run is over"
+                yield f"{nearest}; a smaller domain will do"
+
+
+def _sources(scene: Scene, layout: Layout) -> tuple[np.ndarray, np.ndarray] | None:
+    """Low and high corner of the box around everything that sends out waves; None if nothing does."""
+    marked = layout.region == COVERED
+    contents = [(r.state.pressure, r.state.velocity) for r in scene.fluid.regions]
+    kinds = np.array([contents.index(content) for content in contents] + [COVERED])[layout.region]
+    for axis in range(scene.domain.dimensions):
+        along = kinds.ndim - 1 - axis
+        edges = np.diff(kinds, axis=along) != 0
+        for end in (0, 1):
+            marked |= np.insert(edges, edges.shape[along] if end else 0, False, axis=along)
+        if any(r.state.velocity[axis] for r in scene.fluid.regions):
+            for side in (0, -1):  # a flow meets the ends of the domain
+                marked[(slice(None),) * along + (side,)] = True
+    if not marked.any():
+        return None
+    places = [x[index] for x, index in zip(layout.centers, reversed(np.nonzero(marked)), strict=True)]
+    return np.array([p.min() for p in places]), np.array([p.max() for p in places])
+
+
+# ---- bodies ----------------------------------------------------------------------------------------------------------
+
+
+def thickness(body: Body, domain: Domain) -> float | None:
+    """Smallest extent of a body inside the domain [m]; None for a half space, which has none."""
+    match body.shape:
+        case Box(lower, upper):
+            low, high = np.maximum(lower, domain.lower), np.minimum(upper, domain.upper)
+            return float(np.min(high - low))
+        case HalfSpace():
+            return None
+        case shape:
+            return _extent(shape)
+
+
+def _extent(shape: Shape) -> float | None:
+    """Smallest extent of a shape [m]; None for a half space."""
+    match shape:
+        case Box(lower, upper):
+            return min(b - a for a, b in zip(lower, upper, strict=True))
+        case Ball(_, radius):
+            return 2.0 * radius
+        case Tube(_, inner, outer):
+            return outer - inner
+
+
+def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
+    cell, thick = min(domain.spacing), thickness(body, domain)
+    if in_fluid and body.spacing > BEST_SPACING * cell * (1.0 + 1e-9):
+        yield f"particles are {body.spacing / cell:.3g} cells apart; at most {BEST_SPACING} is better"
+    if thick is not None and thick < (FEWEST_PARTICLES - 0.5) * body.spacing:
+        yield f"fewer than {FEWEST_PARTICLES} particles through its thickness"
+    if in_fluid and thick is not None and thick < math.sqrt(domain.dimensions) * cell:
+        yield f"thinner than sqrt({domain.dimensions}) cells: the fluid sees it thicker than it is"
+
+
+# ---- resolution and dimensions ---------------------------------------------------------------------------------------
+
+
+def _excess_cells(scene: Scene) -> Iterator[str]:
+    """Cells or particles much finer than the smallest thing in the scene; one dimension is cheap at any resolution."""
+    if scene.domain.dimensions == 1:
+        return
+    extents = [size for shape in _shapes(scene) if (size := _extent(shape)) is not None]
+    if scene.fluid and extents:
+        across = min(extents) / max(scene.domain.spacing)
+        if across > MOST_CELLS:
+            yield f"even the smallest thing in the scene is {across:.0f} cells across; fewer may do"
+    for body in _bodies(scene):
+        thick = thickness(body, scene.domain)
+        if thick is not None and thick / body.spacing > MOST_CELLS:
+            yield f"body '{body.name}' is {thick / body.spacing:.0f} particles thick; fewer may do"
+
+
+def _excess_dimensions(scene: Scene) -> Iterator[str]:
+    domain = scene.domain
+    for axis in range(domain.dimensions if domain.dimensions > 1 else 0):
+        if _constant_along(scene, axis):
+            yield f"nothing varies along {AXES[axis]}: {domain.dimensions - 1} dimension(s) without it give the same"
+            return
+    if domain.dimensions == 3:
+        for axis in range(3):
+            if _turns_around(scene, axis):
+                yield (
+                    f"everything is symmetric about a line along {AXES[axis]}: "
+                    "with symmetry planes through it a quarter of the domain gives the same"
+                )
+                return
+
+
+def _constant_along(scene: Scene, axis: int) -> bool:
+    """Whether no shape, flow, body force or end of the domain tells places along `axis` apart."""
+    return (
+        all(_spans(shape, scene.domain, axis) for shape in _shapes(scene))
+        and not any(velocity[axis] for velocity in _velocities(scene))
+        and (scene.fluid is None or not any(scene.fluid.inflow[axis]))
+    )
+
+
+def _spans(shape: Shape, domain: Domain, axis: int) -> bool:
+    match shape:
+        case HalfSpace(_, normal):
+            return normal[axis] == 0.0
+        case Box(lower, upper):
+            return lower[axis] <= domain.lower[axis] and upper[axis] >= domain.upper[axis]
+    return False
+
+
+def _turns_around(scene: Scene, axis: int) -> bool:
+    """Whether all shapes, flows and forces are symmetric about one line along `axis` inside the domain."""
+    across = [a for a in range(3) if a != axis]
+    shapes, domain = _shapes(scene), scene.domain
+    centers = {tuple(s.center[a] for a in across) for s in shapes if isinstance(s, Ball | Tube)}
+    flat = [s for s in shapes if isinstance(s, HalfSpace | Box)]
+    if len(centers) != 1 or not all(_spans(shape, domain, a) for shape in flat for a in across):
+        return False
+    (center,) = centers
+    inside = all(domain.lower[a] < c < domain.upper[a] for a, c in zip(across, center, strict=True))
+    ends = {kind for a in across for kind in domain.boundaries[a]}
+    return inside and ends == {"outflow"} and not any(v[a] for v in _velocities(scene) for a in across)
+
+
+def _velocities(scene: Scene) -> list[tuple[float, ...]]:
+    """Velocities of the flow and of bodies, and gravity."""
+    flows = [state.velocity for state in states(scene.fluid)] if scene.fluid else []
+    return [*flows, *(body.velocity for body in _bodies(scene)), scene.gravity]
+
+
+def _shapes(scene: Scene) -> list[Shape]:
+    regions = [region.shape for region in scene.fluid.regions] if scene.fluid else []
+    fixed = [body.fixed for body in _bodies(scene)]
+    return [shape for shape in (*regions, *(body.shape for body in _bodies(scene)), *fixed) if shape is not None]
+
+
+def _bodies(scene: Scene) -> tuple[Body, ...]:
+    return scene.solid.bodies if scene.solid else ()

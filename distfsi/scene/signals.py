@@ -1,0 +1,150 @@
+"""How fast a scene moves: which states meet at the start, the fastest signals, the number of steps to its end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, LinearEos, NoStrength, Scene
+from distfsi.scene.shapes import contains, distance
+from distfsi.scene.waves import Side, Wave, meet
+
+SAMPLES = {1: 4096, 2: 512, 3: 96}  # points along an axis at which a scene is looked at, at most
+COVERED = -1
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two states that meet along `axis`; `first` lies at the lower coordinate."""
+
+    axis: int
+    first: FluidState
+    second: FluidState
+
+
+class Layout:
+    """The fluid of a scene at its start, seen at the centers of a grid of points as fine as the cells or SAMPLES allow.
+
+    region  (n_z, n_y, n_x), used axes only: number of the region at each point, COVERED in and next to bodies
+    """
+
+    def __init__(self, scene: Scene):
+        domain = scene.domain
+        self.domain, self.fluid = domain, scene.fluid
+        counts = [min(n, SAMPLES[domain.dimensions]) for n in domain.cells]
+        ends = zip(domain.lower, domain.upper, counts, strict=True)
+        self.centers = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in ends]
+        grids = np.meshgrid(*reversed(self.centers), indexing="ij")
+        points = np.stack([grid.ravel() for grid in reversed(grids)], axis=1)
+        region = np.zeros(len(points), dtype=np.int64)
+        for number, part in enumerate(scene.fluid.regions):
+            if part.shape is not None:
+                region[contains(part.shape, points)] = number
+        reach = 0.5 * math.hypot(*(x[1] - x[0] if len(x) > 1 else 0.0 for x in self.centers))
+        for body in scene.solid.bodies if scene.solid else ():
+            region[distance(body.shape, points) < reach] = COVERED
+        self.region = region.reshape(grids[0].shape)
+
+    @cached_property
+    def contacts(self) -> list[Contact]:
+        """All pairs of different states that meet, at the domain's inflows too."""
+        return [*self._between_regions(), *self._at_inflows()]
+
+    def _between_regions(self) -> Iterator[Contact]:
+        for axis in range(self.domain.dimensions):
+            lower, upper = self.neighbours(axis)
+            meeting = (lower != upper) & (lower != COVERED) & (upper != COVERED)
+            for first, second in np.unique(np.stack([lower[meeting], upper[meeting]]), axis=1).T:
+                yield Contact(axis, self.fluid.regions[first].state, self.fluid.regions[second].state)
+
+    def _at_inflows(self) -> Iterator[Contact]:
+        for axis, sides in enumerate(self.fluid.inflow):
+            for side, state in enumerate(sides):
+                edge = self.region.take(-side, axis=self.region.ndim - 1 - axis)
+                for number in np.unique(edge[edge != COVERED]) if state else ():
+                    inner = self.fluid.regions[number].state
+                    yield Contact(axis, inner, state) if side else Contact(axis, state, inner)
+
+    def neighbours(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
+        """Regions of all points but the last along `axis`, and of the next points."""
+        along = self.region.ndim - 1 - axis
+        return np.delete(self.region, -1, axis=along), np.delete(self.region, 0, axis=along)
+
+
+def states(fluid: Fluid) -> list[FluidState]:
+    """All states that the fluid starts from or that come in."""
+    return [region.state for region in fluid.regions] + [s for sides in fluid.inflow for s in sides if s]
+
+
+def waves(fluid: Fluid, contact: Contact) -> list[Wave]:
+    """The states on both sides of a contact and those that form between them, with velocities along its axis."""
+    sides = []
+    for state, sign in ((contact.first, 1.0), (contact.second, -1.0)):
+        eos = fluid.phases[state.phase].eos
+        sides.append(Side(eos, state.density, state.pressure, sign * state.velocity[contact.axis]))
+    return meet(*sides)
+
+
+def fastest_signal(scene: Scene, layout: Layout) -> float:
+    """Largest |u| + c [m/s] in the fluid and in the bodies until waves reflect."""
+    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
+    for state in states(scene.fluid):
+        sound = Side(scene.fluid.phases[state.phase].eos, state.density, state.pressure, 0.0).sound
+        speeds.append(math.hypot(*state.velocity) + sound)
+    for body in scene.solid.bodies if scene.solid else ():
+        speeds.append(math.hypot(*body.velocity) + solid_sound(body))
+    return max(speeds)
+
+
+def steps(scene: Scene, layout: Layout | None) -> int:
+    """Number of time steps to the end, if nothing later is faster than the waves that the start sends out."""
+    rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
+    if scene.solid:
+        rate = max(rate, *(solid_rate(scene, body) for body in scene.solid.bodies))
+    count = math.ceil(scene.time.end * rate)
+    limit = scene.time.maximum_steps
+    return count if limit is None else min(count, limit)
+
+
+def fluid_rate(scene: Scene, layout: Layout) -> float:
+    """max sum_d (|u_d| + c)/h_d [1/s] over the states of the start and those that form where they meet."""
+    fluid, domain = scene.fluid, scene.domain
+    rates = []
+    for state in states(fluid):
+        sound = Side(fluid.phases[state.phase].eos, state.density, state.pressure, 0.0).sound
+        rates.append(sum((abs(u) + sound) / h for u, h in zip(state.velocity, domain.spacing, strict=True)))
+    for contact in layout.contacts:
+        for wave in waves(fluid, contact):
+            rates.append(abs(wave.velocity) / domain.spacing[contact.axis] + wave.sound * _inverse_sum(domain))
+    return max(rates)
+
+
+def _inverse_sum(domain: Domain) -> float:
+    return sum(1.0 / h for h in domain.spacing)
+
+
+def solid_sound(body: Body) -> float:
+    """Longitudinal sound speed [m/s] of a body at rest."""
+    bulk = body.eos.bulk_modulus if isinstance(body.eos, LinearEos) else body.density * body.eos.c0**2
+    shear = 0.0 if isinstance(body.strength, NoStrength) else body.strength.shear_modulus
+    return math.sqrt((bulk + 4.0 / 3.0 * shear) / body.density)
+
+
+def solid_rate(scene: Scene, body: Body) -> float:
+    """1/dt [1/s] of a body's particles (Monaghan's condition, safety 0.3), compressed by the fastest impact.
+
+    Behind a shock of particle velocity u and speed U = c0 + s1 u: sound speed c0 + (2 s1 - 1) u, volume 1 - u/U.
+    """
+    solid, c = scene.solid, solid_sound(body)
+    closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
+    u = 0.5 * max(closing)
+    compression = 1.0
+    if u > 0.0 and not isinstance(body.eos, LinearEos):
+        compression = 1.0 - u / (body.eos.c0 + body.eos.s1 * u)
+        c += (2.0 * body.eos.s1 - 1.0) * u
+    h = solid.smoothing * body.spacing * max(compression, 0.1) ** (1.0 / scene.domain.dimensions)
+    return c * (1.0 + 0.6 * solid.viscosity_alpha) / (0.3 * h)

@@ -1,0 +1,161 @@
+"""What a run takes before it has begun: blocks, memory and bytes on disk of each rank, time by a kept bench."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from distfsi.mesh.blocks import Blocks
+from distfsi.model import fluid_model
+from distfsi.parts.fluid import SSP_RK3
+from distfsi.scene.description import Jwl, Scene, StiffenedGas
+from distfsi.scene.packing import pack
+from distfsi.simulation import deal_blocks
+
+PROCESS_BYTES = 265e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
+PICTURE_BYTES = 30e6  # of the maps in the summary
+PARTICLE_BYTES = {1: 900.0, 2: 1000.0, 3: 1750.0}  # at the peak within a step, by dimensions
+FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
+PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
+SECONDS_PER_FILE, BYTES_PER_SECOND = 0.01, 5e8  # of writing
+
+
+@dataclass(frozen=True)
+class OneOfMany:
+    """Stands for one rank of a run that does not take place."""
+
+    rank: int
+    size: int
+
+
+class Resources:
+    """What `scene` takes on so many `ranks`. Sizes in bytes."""
+
+    def __init__(self, scene: Scene, ranks: int):
+        self.scene, self.ranks = scene, ranks
+        self.dimensions = scene.domain.dimensions
+        bodies = scene.solid.bodies if scene.solid else ()
+        self.positions = {body.name: pack(body, scene.domain.lower, scene.domain.upper)[0] for body in bodies}
+
+    @cached_property
+    def blocks(self) -> list[Blocks]:
+        """The blocks of each rank."""
+        return [deal_blocks(self.scene, OneOfMany(rank, self.ranks)) for rank in range(self.ranks)]
+
+    @property
+    def cells(self) -> int:
+        """Cells of the fluid, 0 without one."""
+        return math.prod(self.scene.domain.cells) if self.scene.fluid else 0
+
+    @property
+    def particles(self) -> int:
+        return sum(map(len, self.positions.values()))
+
+    @cached_property
+    def particles_of_ranks(self) -> np.ndarray:
+        """(ranks,) particles of each rank at the start."""
+        counts = np.zeros(self.ranks, dtype=np.int64)
+        for positions in self.positions.values():
+            owners = self.blocks[0].owners[self.blocks[0].block_of(positions)]
+            counts += np.bincount(owners, minlength=self.ranks)
+        return counts
+
+    # ---- memory ------------------------------------------------------------------------------------------------------
+
+    def memory(self) -> float:
+        """Of the rank that takes most, at its peak."""
+        picture = PICTURE_BYTES if self.dimensions > 1 else 0.0
+        return PROCESS_BYTES + picture + self.arrays()
+
+    def arrays(self) -> float:
+        """Cells and particles of the rank that takes most."""
+        particles = PARTICLE_BYTES[self.dimensions] * self.particles_of_ranks
+        return max(self.field_bytes(blocks) + p for blocks, p in zip(self.blocks, particles, strict=True))
+
+    def field_bytes(self, blocks: Blocks) -> float:
+        """Fields of a rank's cells with their ghosts and padding, and those made for a field file."""
+        if not self.scene.fluid:
+            return 0.0
+        variables = fluid_model(self.scene).variables
+        value = np.dtype(self.scene.fluid.precision).itemsize
+        in_memory = len(SSP_RK3) * variables * value
+        if self.scene.solid:
+            in_memory += 1 + FLOAT * self.dimensions  # what covers a cell, and the impulse on it
+        if self.scene.output.peaks:
+            in_memory += 4 * FLOAT
+        padded = math.prod(blocks.block_cells) * self.cell_file_bytes()
+        return blocks.local_count * (math.prod(blocks.shape) * in_memory + padded)
+
+    # ---- files -------------------------------------------------------------------------------------------------------
+
+    def cell_file_bytes(self) -> int:
+        """Bytes per cell of a field file: density, pressure, velocity and what else the scene has or asks for."""
+        scalars = 2 + (len(self.scene.fluid.phases) == 2)
+        scalars += 4 * bool(self.scene.output.peaks) + self.scene.output.schlieren
+        return VECTOR + FLOAT * scalars
+
+    def output_times(self) -> int:
+        """How many times fields are written."""
+        every, end = self.scene.output.fields_every, self.scene.time.end
+        return 1 + (math.ceil(end / every - 1e-9) if every else 1)
+
+    def output_bytes(self) -> float:
+        """Field files of one time."""
+        blocks = self.blocks[0]
+        cells = blocks.count * math.prod(blocks.block_cells) * self.cell_file_bytes() if self.cells else 0
+        return cells + self.particles * PARTICLE_FILE_BYTES
+
+    # ---- time --------------------------------------------------------------------------------------------------------
+
+    def seconds(self, steps: int, threads: int, bench: dict) -> float:
+        """Of a run of so many steps with so many threads per rank, by a bench of the same machine.
+
+        Work per step grows with cells and particles, and is shared by all threads; the rest of a step is not.
+        """
+        threads_of_bench = bench["ranks"] * bench["threads_per_rank"]
+        share = threads_of_bench / min(self.ranks * threads, max(1, self._pieces()))
+        smallest = "coupled" if self.cells and self.particles else "fluid" if self.cells else "solid"
+        fixed = bench[f"smallest_{smallest}"]
+        work = self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
+        files = self.output_times() * (SECONDS_PER_FILE + self.output_bytes() / BYTES_PER_SECOND)
+        return fixed["start_seconds"] + steps * (fixed["seconds_per_step"] + share * work) + files
+
+    def _pieces(self) -> int:
+        """Into how many pieces the work can be cut: tiles and, by the hundred, particles."""
+        tiles = math.prod(
+            math.ceil(n / t)
+            for n, t in zip(self.scene.domain.cells, self.scene.performance.tile_cells, strict=True)
+        )
+        return max(tiles if self.cells else 1, self.particles // 100)
+
+    def _seconds_per_cell(self, bench: dict) -> float:
+        """Of a time step, with the nearest of the benchmarks in two dimensions and the step to other ones."""
+        if not self.cells:
+            return 0.0
+        fluid, D = self.scene.fluid, self.dimensions
+        eos = {type(phase.eos) for phase in fluid.phases}
+        two = "tnt_air" if Jwl in eos else "water_air" if StiffenedGas in eos else "shock_bubble"
+        rate = bench[f"{two if len(fluid.phases) == 2 else 'euler'}_2d"]["cell_stages_per_second"]
+        bubble = bench["shock_bubble_2d"]["cell_stages_per_second"]
+        rate *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"] / bubble
+        if fluid.precision == "float32":
+            rate *= bench["shock_bubble_2d_float32"]["cell_stages_per_second"] / bubble
+        return len(SSP_RK3) / rate
+
+    def _seconds_per_particle(self, bench: dict) -> float:
+        """Of a time step; in a fluid with what the coupling takes besides."""
+        if not self.particles:
+            return 0.0
+        alone = 1.0 / bench[f"copper_block_{self.dimensions}d"]["particle_steps_per_second"]
+        if not self.cells:
+            return alone
+        D = max(self.dimensions, 2)
+        both = bench[f"blast_on_copper_{D}d"]
+        stages = bench["tnt_air_2d"]["cell_stages_per_second"]
+        stages *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"]
+        stages /= bench["shock_bubble_2d"]["cell_stages_per_second"]
+        fluid = len(SSP_RK3) * both["cells"] / stages / both["particles"]
+        return max(1.0 / both["particle_steps_per_second"] - fluid, alone)

@@ -1,0 +1,42 @@
+"""Speed on the shock-bubble case at four resolutions, beside the paper's Table 2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+
+from distfsi.mesh.communicator import Communicator
+from distfsi.scene import load
+from distfsi.simulation import Simulation
+from distfsi.study.bench import time_loop
+from distfsi.study.references import SHOCK_BUBBLE_SPEEDS, MeshSpeed
+from distfsi.study.shock_bubble import INPUT
+
+SECONDS = 0.5  # of each of the loops of which the fastest counts
+
+
+def cells_of(row: MeshSpeed) -> tuple[int, int]:
+    """The cells along x and y that cover the case's 325 x 89 mm at the row's cell size."""
+    return round(325 / row.spacing), round(89 / row.spacing)
+
+
+def line(row: MeshSpeed, steps_per_second: float) -> str:
+    """One line of the table."""
+    cells = prod(cells_of(row))
+    theirs, ours = (1e-6 * n * rate for n, rate in ((row.cells, row.steps_per_second), (cells, steps_per_second)))
+    return (
+        f"{row.spacing:9.3f}  {row.nodes:>9,}  {row.cells:>9,}  {row.steps_per_second:7.1f}  {theirs:12.2f}"
+        f"   |{cells:>10,}  {steps_per_second:7.1f}  {ours:12.2f}"
+    )
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Print steps per second from the start of the case beside the paper's."""
+    if communicator.rank == 0:
+        print("           the paper (RTX 4090)                                    | here")
+        print("cell [mm]      nodes      cells  steps/s  Mcell-steps/s  |     cells  steps/s  Mcell-steps/s")
+    for row in SHOCK_BUBBLE_SPEEDS:
+        scene = load(INPUT, [f"domain.cells={list(cells_of(row))}", *overrides])
+        _, seconds = time_loop(Simulation.of(scene, communicator), SECONDS)
+        if communicator.rank == 0:
+            print(line(row, 1.0 / seconds), flush=True)

@@ -1,0 +1,90 @@
+"""Standard scenes: the work that benchmarks time. Lengths are in cells, so that a cell has the size one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from distfsi.scene import description as scene
+from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
+
+AIR, HELIUM, WATER = scene.IdealGas(1.4), scene.IdealGas(1.67), scene.StiffenedGas(4.4, 6e8)
+TNT = scene.Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
+COPPER = scene.MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
+COPPER_STRENGTH = scene.JohnsonCook(46e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 293.0, 1356.0, 383.0, 0.9)
+BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressure
+
+
+def gases(
+    cells: tuple[int, ...], eos: tuple, inner: tuple[float, float], outer: tuple[float, float], precision="float64"
+) -> scene.Scene:
+    """A ball of one material (density, pressure) in another, in a closed box; the standard fluid work."""
+    D = len(cells)
+    rest = (0.0,) * D
+    phases = tuple(scene.Phase(f"phase {k}", e) for k, e in enumerate(eos))
+    outside = scene.FluidState(len(eos) - 1, *outer, rest)
+    inside = scene.FluidState(0, *inner, rest)
+    ball = scene.Ball(tuple(0.5 * n for n in cells), 0.25 * min(cells))
+    regions = (scene.Region(outside, None), scene.Region(inside, ball))
+    fluid = scene.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision)
+    domain = scene.Domain(rest, tuple(float(n) for n in cells), cells, (("wall", "wall"),) * D)
+    return _endless(domain, fluid, None)
+
+
+def copper(particles: int, dimensions: int) -> scene.Scene:
+    """A cube of elastic-plastic copper, so many particles long, that moves freely; the standard solid work."""
+    D, side = dimensions, 0.5 * particles
+    domain = scene.Domain(
+        (-0.5 * side,) * D, (1.5 * side,) * D, (max(4, particles),) * D, (("outflow", "outflow"),) * D
+    )
+    return _endless(domain, None, _cube((0.0,) * D, side))
+
+
+def blast_on_copper(cells: int, dimensions: int) -> scene.Scene:
+    """Copper in the way of exploding TNT; the standard coupled work."""
+    D = dimensions
+    blast = gases((cells,) * D, (TNT, AIR), BURNT_TNT, AMBIENT_AIR)
+    cube = _cube((0.75 * cells,) + (0.375 * cells,) * (D - 1), 0.25 * cells)
+    domain = scene.Domain(blast.domain.lower, blast.domain.upper, blast.domain.cells, (("outflow", "outflow"),) * D)
+    return _endless(domain, blast.fluid, cube)
+
+
+def _cube(lower: tuple[float, ...], side: float) -> scene.Solid:
+    """Copper with two particles per cell along each axis."""
+    D = len(lower)
+    shape = scene.Box(lower, tuple(a + side for a in lower))
+    velocity = (10.0,) + (0.0,) * (D - 1)
+    return scene.Solid(
+        (scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None),), 1.3, 1.0, 2.0
+    )
+
+
+def _endless(domain: scene.Domain, fluid: scene.Fluid | None, solid: scene.Solid | None) -> scene.Scene:
+    D = domain.dimensions
+    performance = scene.Performance(BLOCK_CELLS[D - 1], TILE_CELLS[D - 1])
+    time, output = scene.Time(np.inf, 0.5, None), scene.Output("", 0.0, 1)
+    return scene.Scene("bench", domain, time, (0.0,) * D, fluid, solid, output, performance)
+
+
+TWO_GASES = (HELIUM, AIR), (0.138, 1.0), (1.0, 2.0)
+FLUIDS: dict[str, Callable[[], scene.Scene]] = {
+    "shock_bubble_1d": lambda: gases((65536,), *TWO_GASES),
+    "shock_bubble_2d": lambda: gases((1300, 356), *TWO_GASES),
+    "shock_bubble_2d_float32": lambda: gases((1300, 356), *TWO_GASES, "float32"),
+    "shock_bubble_3d": lambda: gases((128, 96, 96), *TWO_GASES),
+    "water_air_2d": lambda: gases((1024, 512), (WATER, AIR), (1000.0, 1e8), (1.2, 1e5)),
+    "tnt_air_2d": lambda: gases((1024, 512), (TNT, AIR), BURNT_TNT, AMBIENT_AIR),
+    "euler_2d": lambda: gases((1024, 512), (AIR,), (1.0, 10.0), (1.0, 1.0)),
+}
+SOLIDS = {
+    "copper_block_1d": lambda: copper(4096, 1),
+    "copper_block_2d": lambda: copper(128, 2),
+    "copper_block_3d": lambda: copper(32, 3),
+}
+COUPLED = {"blast_on_copper_2d": lambda: blast_on_copper(256, 2), "blast_on_copper_3d": lambda: blast_on_copper(48, 3)}
+SMALLEST = {
+    "fluid": lambda: gases((8, 8), *TWO_GASES),
+    "solid": lambda: copper(8, 2),
+    "coupled": lambda: blast_on_copper(16, 2),
+}

@@ -1,0 +1,16 @@
+#!/bin/bash
+# What the Slurm jobs of this folder have in common: start the ranks, and put the job back into the queue when the run
+# stopped early. distfsi exits with 75 then, and has written a restart file; --restart auto continues from it.
+set -euo pipefail
+# shellcheck source=/dev/null
+source "${VENV:-.venv}/bin/activate"
+export OMP_NUM_THREADS=1 # distfsi starts its own threads
+export SRUN_CPUS_PER_TASK=$SLURM_CPUS_PER_TASK
+
+# Not --kill-on-bad-exit: the first rank to exit with 75 would have the others killed, and the code would be theirs.
+code=0
+srun --cpu-bind=cores --kill-on-bad-exit=0 --wait=30 python -m distfsi run "$@" --restart auto || code=$?
+if [ "$code" -eq 75 ]; then
+    scontrol requeue "$SLURM_JOB_ID"
+fi
+exit "$code"

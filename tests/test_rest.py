@@ -1,0 +1,103 @@
+"""Tiles at rest are not computed, and the result is the same to the bit."""
+
+import re
+
+import numpy as np
+import pytest
+
+from distfsi.device.markers import helper
+from distfsi.kernels import fluid as kernels
+from launch import ROOT
+from mpi_rest import SCENES, cells_of, digest, follow, simulation_of
+
+
+@helper
+def never_uniform(U, u, su, sz, sy, n, m, l):
+    return False
+
+
+@pytest.fixture(scope="module")
+def rested():
+    """Every scene as users run it."""
+    return {name: follow(name) for name in [*SCENES, "tube"]}
+
+
+@pytest.fixture(scope="module")
+def computed():
+    """Every scene with all tiles computed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "is_uniform", never_uniform)
+        return {name: follow(name) for name in [*SCENES, "tube"]}
+
+
+def test_without_the_look_at_the_values_nothing_rests(computed):
+    """So that the tests below do compare."""
+    assert all(share == 0.0 for _, share in computed.values())
+
+
+@pytest.mark.parametrize("name", [*SCENES, "tube"])
+def test_rest_changes_no_bit(rested, computed, name):
+    """Cells, time steps and the whole row of the history, in which each wall has its impulse."""
+    found, share = rested[name]
+    for what, values in computed[name][0].items():
+        np.testing.assert_array_equal(found[what], values, err_msg=what)
+    assert digest(found) == digest(computed[name][0])
+    assert share == 0.0 if name == "falling" else share > 0.2
+
+
+def stirred(name):
+    """Cells of a scene in which, after 3 steps, something else than a stage writes into a quiet block."""
+    simulation = simulation_of(name)
+    fluid = simulation.fluid
+    for _ in range(3):
+        simulation.step()
+    start, calm = fluid.snapshot()["cells"]["state"].copy(), fluid.rest.calm.copy()
+    last = simulation.blocks.local_count - 1
+    fluid.cells(last)[:, :, 5:7, 8:9] *= 2.0
+    fluid.wake(np.arange(last + 1) == last)
+    for _ in range(6):
+        simulation.step()
+    written = cells_of(simulation)
+    fluid.restore({"cells": {"state": start}, "sums": fluid.snapshot()["sums"]})
+    for _ in range(6):
+        simulation.step()
+    return written, cells_of(simulation), calm[fluid.tiles[:, kernels.BLOCK] == last]
+
+
+def test_what_is_written_from_outside_wakes(monkeypatch):
+    """A quiet block into which something is written, and a fluid that is restored."""
+    *found, calm = stirred("corner")
+    assert calm.all()
+    monkeypatch.setattr(kernels, "is_uniform", never_uniform)
+    for with_rest, without in zip(found, stirred("corner")[:2], strict=True):
+        assert with_rest.tobytes() == without.tobytes()
+
+
+def test_blocks_with_covered_cells_are_looked_at():
+    """The coupling writes into their cells before every stage."""
+    simulation = simulation_of("tube")
+    for _ in range(10):
+        simulation.step()
+    fluid, blocks = simulation.fluid, simulation.blocks
+    covered = [fluid.active(simulation.coupling.covered, block).any() for block in range(blocks.local_count)]
+    near_solid = np.array(covered)[fluid.tiles[:, kernels.BLOCK]]
+    assert near_solid.any()
+    assert fluid.rest.calm.any()
+    assert not fluid.rest.calm[near_solid].any()
+
+
+@pytest.mark.parametrize(
+    ("ranks", "names"), [(2, ("corner", "space")), (4, ("corner", "periodic", "inflow", "interface", "tube"))]
+)
+def test_rest_on_several_ranks(rested, computed, mpiexec, ranks, names):
+    """The same bits, and as much at rest as on one rank."""
+    printed = dict(re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, ROOT / "tests/mpi_rest.py", *names), re.MULTILINE))
+    assert printed == {name: f"{digest(computed[name][0])} {rested[name][1]:.6f}" for name in names}
+
+
+def test_cut_changes_no_bit_of_the_cells(rested):
+    """Whatever the blocks and tiles."""
+    found = [rested[name][0] for name in ("corner", "large blocks", "thin tiles")]
+    for other in found[1:]:
+        for what in ("cells", "time steps"):
+            np.testing.assert_array_equal(other[what], found[0][what], err_msg=what)
