@@ -122,7 +122,9 @@ def fluid_model(scene: Scene) -> FluidModel:
     names = ("primitives", "conserved", "face_flux", "updated", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
     bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
-    solver = zip(("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True)
+    solver = zip(
+        ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
+    )
     bindings |= {name: Bound(function) for name, function in solver}
     bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
     return FluidModel(constants, bindings, eos, dimensions)

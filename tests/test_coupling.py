@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas
 from scipy.ndimage import label
 
 from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from launch import run_ranks
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas
 
 # ---- covered cells --------------------------------------------------------------------------------------------------
 

@@ -5,13 +5,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fluids import AIR, MATERIALS, PAIRS, TNT, TRACE, WATER, model_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from distfsi.device.emit import plain
 from distfsi.physics import limiters, riemann, two_phase
 from distfsi.scene import thermodynamics
+from fluids import AIR, MATERIALS, PAIRS, TNT, TRACE, WATER, model_of
 
 SINGLE = tuple((name,) for name in ("air", "water", "tnt"))
 FLUIDS = SINGLE + PAIRS

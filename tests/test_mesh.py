@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-import mpi_mesh
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mpi_mesh
 from distfsi.errors import InputError
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import Blocks, Grid

@@ -6,7 +6,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
-import mpi_output
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -15,12 +14,13 @@ from matplotlib.image import AxesImage
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
+import mpi_output
 from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
 from distfsi.output.history import History, read_history
-from distfsi.output.scales import scaled
 from distfsi.output.picture import Figure, draw_summary
+from distfsi.output.scales import scaled
 from distfsi.output.schedule import Every
 
 SCRIPT = Path(__file__).with_name("mpi_output.py")

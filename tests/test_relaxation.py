@@ -4,13 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fluids import MATERIALS, PAIRS, TRACE, model_of
 
 from distfsi.device import cpu
 from distfsi.device.markers import driver
 from distfsi.physics.relaxation import relaxed_fraction_change
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
+from fluids import MATERIALS, PAIRS, TRACE, model_of
 
 EXTENDED = np.longdouble
 SAMPLES = 1000

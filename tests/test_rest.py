@@ -91,7 +91,9 @@ def test_blocks_with_covered_cells_are_looked_at():
 )
 def test_rest_on_several_ranks(rested, computed, mpiexec, ranks, names):
     """The same bits, and as much at rest as on one rank."""
-    printed = dict(re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, ROOT / "tests/mpi_rest.py", *names), re.MULTILINE))
+    printed = dict(
+        re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, ROOT / "tests/mpi_rest.py", *names), re.MULTILINE)
+    )
     assert printed == {name: f"{digest(computed[name][0])} {rested[name][1]:.6f}" for name in names}
 
 

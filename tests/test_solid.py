@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from mpi_solid import COPPER_EOS, SOFT, SOFT_EOS, body, solid, step
 
 from distfsi.scene.description import Ball, Box, Elastic, HalfSpace, LinearEos, NoStrength
 from launch import run_ranks
+from mpi_solid import COPPER_EOS, SOFT, SOFT_EOS, body, solid, step
 
 
 def energy(part):

@@ -6,11 +6,11 @@ import re
 
 import numpy as np
 import pytest
-from fluids import model_of
 from llvmlite.binding import get_host_cpu_features
 
 from distfsi.device import emit, runtime
 from distfsi.kernels import fluid, peaks
+from fluids import model_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"

@@ -52,12 +52,15 @@ class Picture:
 
 
 def draw_charts(path: Path, charts: Sequence[Chart], columns: int) -> Path:
-    """Draw the charts row by row; returns `path`."""
+    """Draw the charts, all with the labels of the first, row by row; returns `path`."""
     rows = -(-len(charts) // columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, rows * CHART_HEIGHT), layout="constrained")
-        for axes, chart in zip(figure.subplots(rows, columns, squeeze=False).flat, charts, strict=False):
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axes, chart in zip(grid.flat, charts, strict=False):
             _draw_chart(axes, chart)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
         return _save(figure, path)
 
 
@@ -92,8 +95,6 @@ def _draw_chart(axes: Axes, chart: Chart) -> None:
         axes.plot(curve.x, curve.y, curve.style, label=curve.label, markersize=4, linewidth=1.2)
     axes.set(title=chart.title, xlabel=chart.x_label, ylabel=chart.y_label)
     axes.grid(alpha=0.3)
-    if any(curve.label for curve in chart.curves):
-        axes.legend(fontsize="small")
 
 
 def _save(figure: Figure, path: Path) -> Path:

@@ -102,8 +102,8 @@ class Film:
         time, fields, (low, high) = read_layer(cells, normal, place, names)
         axes = ACROSS[normal]
         extent = tuple(float(corner[axis]) for axis in axes for corner in (low, high))
-        middle = 0.5 * (low[normal] + high[normal])
-        near, distance = _near_plane(read_particles(particles)[1], normal, middle) if particles else ({}, 0.0)
+        place = 0.5 * (low[normal] + high[normal]) if place is None else place
+        near, distance = _near_plane(read_particles(particles)[1], normal, place) if particles else ({}, 0.0)
         return Frame(time, extent, fields, near, distance, axes)
 
     def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +131,8 @@ def _near_plane(columns: Mapping[str, np.ndarray], normal: int, place: float) ->
     if len(position) < 2:
         return dict(columns), 0.0
     some = position[:: max(1, len(position) // 1000)]
-    neighbours = min(2 * np.count_nonzero(np.ptp(position, axis=0)), len(position) - 1)  # of a particle in a lattice
+    # In a lattice a particle on the surface still has one neighbour more than there are dimensions.
+    neighbours = min(np.count_nonzero(np.ptp(position, axis=0)) + 1, len(position) - 1)
     spacing = float(np.median(cKDTree(position).query(some, k=neighbours + 1)[0][:, -1]))
     near = np.abs(position[:, normal] - place) <= 0.5 * spacing
     return {name: column[near] for name, column in columns.items()}, spacing

@@ -124,9 +124,7 @@ def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Energies that change, less what they are at the start."""
     largest_of_all = max((np.abs(values).max() for values in energies.values()), default=0.0)
     return {
-        name: values - values[:1]
-        for name, values in energies.items()
-        if np.ptp(values) > ROUNDING * largest_of_all
+        name: values - values[:1] for name, values in energies.items() if np.ptp(values) > ROUNDING * largest_of_all
     }
 
 

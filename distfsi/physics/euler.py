@@ -80,16 +80,16 @@ def face_flux(left, right, jump):
 
     reach = s if subsonic else 0.0
     kappa = contact_jump_diffusion(reach, s_there, s_star)
-    slip = slip_viscosity(
-        U[0], reach, rho * (s - u), there[0] * (s_there - there[1]), jump, min(rho_l * c_l * c_l, rho_r * c_r * c_r)
-    )
+    bulk = min(rho_l * (c_l * c_l), rho_r * (c_r * c_r))
+    viscosity = slip_viscosity(rho_l * (s_l - u_l), rho_r * (s_r - u_r), jump, bulk)
     F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(VARIABLES))
-    heat = 0.5 * sum(there[1 + d] * there[1 + d] - W[1 + d] * W[1 + d] for d in static_range(1, DIMENSIONS))
+    slip = tuple(right[1 + d] - left[1 + d] for d in static_range(DIMENSIONS))
+    work = 0.5 * sum(slip[d] * (right[1 + d] + left[1 + d]) for d in static_range(1, DIMENSIONS))
     return (
         F[0],
         F[1] + p_face,
-        *(F[1 + d] - slip * (there[1 + d] - W[1 + d]) for d in static_range(1, DIMENSIONS)),
-        F[1 + DIMENSIONS] + p_face * u_face - slip * heat,
+        *(F[1 + d] - viscosity * slip[d] for d in static_range(1, DIMENSIONS)),
+        F[1 + DIMENSIONS] + p_face * u_face - viscosity * work,
     )
 
 

@@ -35,33 +35,32 @@ def contact_speed(rho_l, u_l, p_l, s_l, rho_r, u_r, p_r, s_r):
     return (p_r - p_l + m_l * u_l - m_r * u_r) / (m_l - m_r)
 
 
-# In the following: s, the wave between the upwind state and the contact (0 when it does not reach the face); s_there,
-# the one on the other side. From left to right they are s < s_star < s_there, from right to left the other way round,
-# and the results change their sign, as the jumps do.
-
-
 def sharp(s, s_there, s_star):
     """HLLC: nothing crosses a contact."""
     return 0.0
 
 
 def contact_diffusion(s, s_there, s_star):
-    """HLL (Harten, Lax, van Leer, SIAM Rev. 25, 1983): flux per jump of a conserved density at the contact [m/s]."""
+    """HLL (Harten, Lax, van Leer, SIAM Rev. 25, 1983): flux per jump of a density at the contact [m/s].
+
+    s: the wave between the upwind state and the contact, 0 when it does not reach the face; s_there: the wave on the
+    other side. The result's sign is that of s_star, as the jump's is.
+    """
     return -s * (s_there - s_star) / (s_there - s)
 
 
-def inviscid(rho_star, s, m, m_there, jump, bulk):
+def inviscid(m_l, m_r, jump, bulk):
     """HLLC: slip along a contact is free."""
     return 0.0
 
 
-def shear_along_shocks(rho_star, s, m, m_there, jump, bulk):
-    """Momentum flux per slip along the face [kg/(m2 s)], where the face cuts a strong shock.
+def shear_along_shocks(m_l, m_r, jump, bulk):
+    """Momentum flux per slip [kg/(m2 s)] where the face cuts a strong shock, 0 elsewhere.
 
-    Both sides share the tangential velocity of HLL, as in HLLCM (Shen, Yan, Yuan, J. Comput. Phys. 309, 2016): it is
-    slip between the columns of cells that a shock crosses that lets it break up (carbuncle). Elsewhere there is none,
-    and contacts stay sharp everywhere. `jump` [Pa] is the largest pressure difference of neighbours along the face
-    (where to look: Quirk, Int. J. Numer. Methods Fluids 18, 1994); bulk: rho c^2 at the face; m: rho (s - u).
+    It is the slip between the columns of cells through which a shock runs that lets it break up (carbuncle); a shear
+    viscosity cures it and leaves contacts sharp (Shen, Yan, Yuan, J. Comput. Phys. 309, 2016). Here slip is passed on
+    like a wave in media of the impedances m = rho (s - u). `jump` [Pa]: the largest pressure difference along the face
+    (where to look: Quirk, Int. J. Numer. Methods Fluids 18, 1994); bulk: rho c^2.
     """
     strong = FULL_STRENGTH * bulk
-    return min(jump, strong) * (rho_star * -s) * m_there / (strong * (m_there - m))
+    return min(jump, strong) * (m_l * m_r) / (strong * (m_l - m_r))

@@ -45,7 +45,7 @@ conserved = chosen("conserved", "primitive state -> conserved state")
 face_flux = chosen("face_flux", "left and right primitive states, normal velocity first; pressure jump -> fluxes")
 bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest and fastest wave [m/s]")
 contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
-slip_viscosity = chosen("slip_viscosity", "star state, pressure jump -> momentum flux per slip at a face [kg/(m2 s)]")
+slip_viscosity = chosen("slip_viscosity", "impedances, pressure jump, rho c^2 -> momentum flux per slip [kg/(m2 s)]")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
 sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
 

@@ -134,7 +134,7 @@ def face_flux(left, right, jump):
     from_left = s_star >= 0.0
     W = tuple(left[v] if from_left else right[v] for v in static_range(VARIABLES))
     there = tuple(right[v] if from_left else left[v] for v in static_range(VARIABLES))
-    rho, rho_there = rho_l if from_left else rho_r, rho_r if from_left else rho_l
+    rho = rho_l if from_left else rho_r
     s, s_there = s_l if from_left else s_r, s_r if from_left else s_l
     subsonic = s_l < 0.0 if from_left else s_r > 0.0
     u, p = W[2], W[2 + DIMENSIONS]
@@ -144,18 +144,17 @@ def face_flux(left, right, jump):
 
     reach = s if subsonic else 0.0
     kappa = contact_jump_diffusion(reach, s_there, s_star)
-    slip = slip_viscosity(
-        U[0] + U[1], reach, rho * (s - u), rho_there * (s_there - there[2]), jump,
-        min(rho_l * c_l * c_l, rho_r * c_r * c_r),
-    )  # fmt: skip
+    bulk = min(rho_l * (c_l * c_l), rho_r * (c_r * c_r))
+    viscosity = slip_viscosity(rho_l * (s_l - u_l), rho_r * (s_r - u_r), jump, bulk)
     F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(FLUXES))
-    heat = 0.5 * sum(there[2 + d] * there[2 + d] - W[2 + d] * W[2 + d] for d in static_range(1, DIMENSIONS))
+    slip = tuple(right[2 + d] - left[2 + d] for d in static_range(DIMENSIONS))
+    work = 0.5 * sum(slip[d] * (right[2 + d] + left[2 + d]) for d in static_range(1, DIMENSIONS))
     return (
         F[0],
         F[1],
         F[2] + p_face,
-        *(F[2 + d] - slip * (there[2 + d] - W[2 + d]) for d in static_range(1, DIMENSIONS)),
-        F[2 + DIMENSIONS] + p_face * u_face - slip * heat,
+        *(F[2 + d] - viscosity * slip[d] for d in static_range(1, DIMENSIONS)),
+        F[2 + DIMENSIONS] + p_face * u_face - viscosity * work,
         *(F[v] for v in static_range(3 + DIMENSIONS, FLUXES)),
     )
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
-from distfsi.scene.signals import COVERED, Layout, fastest_signal, states
+from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 
 AXES, ENDS = "xyz", ("low", "high")
 BEST_SPACING = 0.5  # of a fluid cell
@@ -57,14 +57,14 @@ def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
 def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
-    if any(scene.gravity) or any(state for sides in scene.fluid.inflow for state in sides):
+    if any(scene.gravity):
         return
-    sources = _sources(scene, layout)
-    if sources is None:
+    if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"
         return
-    reach = fastest_signal(scene, layout) * scene.time.end
-    for axis, (low, high) in enumerate(zip(*sources, strict=True)):
+    reach = fastest_signal(scene, layout) * end_time(scene, layout)
+    for axis, (centers, marked) in enumerate(zip(layout.centers, reversed(np.nonzero(layout.sources)), strict=True)):
+        low, high = centers[marked.min()], centers[marked.max()]
         length = domain.upper[axis] - domain.lower[axis]
         for side, gap in enumerate((low - domain.lower[axis], domain.upper[axis] - high)):
             rest = gap - reach
@@ -72,25 +72,6 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
                 place = f"the {ENDS[side]} {AXES[axis]} end"
                 nearest = f"no wave comes nearer to {place} than {rest:.3g} m before the run is over"
                 yield f"{nearest}; a smaller domain will do"
-
-
-def _sources(scene: Scene, layout: Layout) -> tuple[np.ndarray, np.ndarray] | None:
-    """Low and high corner of the box around everything that sends out waves; None if nothing does."""
-    marked = layout.region == COVERED
-    contents = [(r.state.pressure, r.state.velocity) for r in scene.fluid.regions]
-    kinds = np.array([contents.index(content) for content in contents] + [COVERED])[layout.region]
-    for axis in range(scene.domain.dimensions):
-        along = kinds.ndim - 1 - axis
-        edges = np.diff(kinds, axis=along) != 0
-        for end in (0, 1):
-            marked |= np.insert(edges, edges.shape[along] if end else 0, False, axis=along)
-        if any(r.state.velocity[axis] for r in scene.fluid.regions):
-            for side in (0, -1):  # a flow meets the ends of the domain
-                marked[(slice(None),) * along + (side,)] = True
-    if not marked.any():
-        return None
-    places = [x[index] for x, index in zip(layout.centers, reversed(np.nonzero(marked)), strict=True)]
-    return np.array([p.min() for p in places]), np.array([p.max() for p in places])
 
 
 # ---- bodies ----------------------------------------------------------------------------------------------------------

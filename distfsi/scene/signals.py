@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, LinearEos, NoStrength, Scene
 from distfsi.scene.shapes import contains, distance
@@ -29,7 +30,8 @@ class Contact:
 class Layout:
     """The fluid of a scene at its start, seen at the centers of a grid of points as fine as the cells or SAMPLES allow.
 
-    region  (n_z, n_y, n_x), used axes only: number of the region at each point, COVERED in and next to bodies
+    centers, spacing  of the points, along x, y, z [m]
+    region            (n_z, n_y, n_x), used axes only: number of the region at each point, COVERED in and next to bodies
     """
 
     def __init__(self, scene: Scene):
@@ -38,13 +40,14 @@ class Layout:
         counts = [min(n, SAMPLES[domain.dimensions]) for n in domain.cells]
         ends = zip(domain.lower, domain.upper, counts, strict=True)
         self.centers = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in ends]
+        self.spacing = [(b - a) / n for a, b, n in zip(domain.lower, domain.upper, counts, strict=True)]
         grids = np.meshgrid(*reversed(self.centers), indexing="ij")
         points = np.stack([grid.ravel() for grid in reversed(grids)], axis=1)
         region = np.zeros(len(points), dtype=np.int64)
         for number, part in enumerate(scene.fluid.regions):
             if part.shape is not None:
                 region[contains(part.shape, points)] = number
-        reach = 0.5 * math.hypot(*(x[1] - x[0] if len(x) > 1 else 0.0 for x in self.centers))
+        reach = 0.5 * math.hypot(*self.spacing)
         for body in scene.solid.bodies if scene.solid else ():
             region[distance(body.shape, points) < reach] = COVERED
         self.region = region.reshape(grids[0].shape)
@@ -69,6 +72,24 @@ class Layout:
                     inner = self.fluid.regions[number].state
                     yield Contact(axis, inner, state) if side else Contact(axis, state, inner)
 
+    @cached_property
+    def sources(self) -> np.ndarray:
+        """Which points send out waves at the start: bodies, edges between states of other pressure or velocity, ends of
+        the domain that a flow meets."""
+        sources = self.region == COVERED
+        contents = [(r.state.pressure, r.state.velocity) for r in self.fluid.regions]
+        kinds = np.array([contents.index(content) for content in contents] + [COVERED])[self.region]
+        for axis in range(self.domain.dimensions):
+            along = kinds.ndim - 1 - axis
+            edges = np.diff(kinds, axis=along) != 0
+            for end in (0, edges.shape[along]):
+                sources |= np.insert(edges, end, False, axis=along)
+            moving = any(r.state.velocity[axis] for r in self.fluid.regions)
+            for side in (0, 1):
+                if moving or self.fluid.inflow[axis][side]:
+                    sources[(slice(None),) * along + (-side,)] = True
+        return sources
+
     def neighbours(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
         """Regions of all points but the last along `axis`, and of the next points."""
         along = self.region.ndim - 1 - axis
@@ -89,25 +110,56 @@ def waves(fluid: Fluid, contact: Contact) -> list[Wave]:
     return meet(*sides)
 
 
+def _sound(fluid: Fluid, state: FluidState) -> float:
+    return Side(fluid.phases[state.phase].eos, state.density, state.pressure, 0.0).sound
+
+
 def fastest_signal(scene: Scene, layout: Layout) -> float:
     """Largest |u| + c [m/s] in the fluid and in the bodies until waves reflect."""
     speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
     for state in states(scene.fluid):
-        sound = Side(scene.fluid.phases[state.phase].eos, state.density, state.pressure, 0.0).sound
-        speeds.append(math.hypot(*state.velocity) + sound)
+        speeds.append(math.hypot(*state.velocity) + _sound(scene.fluid, state))
     for body in scene.solid.bodies if scene.solid else ():
         speeds.append(math.hypot(*body.velocity) + solid_sound(body))
     return max(speeds)
 
 
+def moving_share(scene: Scene, layout: Layout) -> float:
+    """Share of the fluid's tiles that compute, as the mean over the time of the run: a tile of one state rests until
+    the first wave comes."""
+    if any(scene.gravity):
+        return 1.0
+    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
+    speed = max(speeds) if speeds else max(_sound(scene.fluid, state) for state in states(scene.fluid))
+    if not layout.sources.any():
+        return 0.0
+    arrival = distance_transform_edt(~layout.sources, sampling=layout.spacing[::-1]) / speed
+    sizes = zip(scene.performance.tile_cells, scene.domain.cells, layout.region.shape[::-1], strict=True)
+    for axis, (tile, cells, points) in enumerate(sizes):
+        edges = np.unique(np.arange(0, cells, tile) * points // cells)
+        along = layout.region.ndim - 1 - axis
+        first = np.minimum.reduceat(arrival, edges, axis=along)
+        arrival = np.repeat(first, np.diff([*edges, points]), axis=along)
+    return float(np.mean(np.clip(1.0 - arrival / end_time(scene, layout), 0.0, 1.0)))
+
+
 def steps(scene: Scene, layout: Layout | None) -> int:
-    """Number of time steps to the end, if nothing later is faster than the waves that the start sends out."""
-    rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
-    if scene.solid:
-        rate = max(rate, *(solid_rate(scene, body) for body in scene.solid.bodies))
-    count = math.ceil(scene.time.end * rate)
+    """Number of time steps, if nothing later is faster than the waves that the start sends out."""
+    count = math.ceil(scene.time.end * _step_rate(scene, layout))
     limit = scene.time.maximum_steps
     return count if limit is None else min(count, limit)
+
+
+def end_time(scene: Scene, layout: Layout | None) -> float:
+    """When the run ends [s], by its end time or its number of steps."""
+    limit = scene.time.maximum_steps
+    return scene.time.end if limit is None else min(scene.time.end, limit / _step_rate(scene, layout))
+
+
+def _step_rate(scene: Scene, layout: Layout | None) -> float:
+    """1/dt [1/s]."""
+    rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
+    return max(rate, *(solid_rate(scene, body) for body in scene.solid.bodies)) if scene.solid else rate
 
 
 def fluid_rate(scene: Scene, layout: Layout) -> float:
@@ -115,7 +167,7 @@ def fluid_rate(scene: Scene, layout: Layout) -> float:
     fluid, domain = scene.fluid, scene.domain
     rates = []
     for state in states(fluid):
-        sound = Side(fluid.phases[state.phase].eos, state.density, state.pressure, 0.0).sound
+        sound = _sound(fluid, state)
         rates.append(sum((abs(u) + sound) / h for u, h in zip(state.velocity, domain.spacing, strict=True)))
     for contact in layout.contacts:
         for wave in waves(fluid, contact):

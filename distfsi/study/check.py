@@ -6,7 +6,6 @@ from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.scene.advice import advice, thickness
 from distfsi.scene.description import Body, Scene
-from distfsi.scene.signals import Layout, steps
 from distfsi.study.resources import Resources
 
 
@@ -16,7 +15,6 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: dict | None = 
     `bench`: what `bench.kept_bench` gives, for the time.
     """
     domain, resources = scene.domain, Resources(scene, ranks)
-    layout = Layout(scene) if scene.fluid else None
     size = " x ".join(f"{b - a:.6g}" for a, b in zip(domain.lower, domain.upper, strict=True))
     lines = [
         scene.title,
@@ -28,14 +26,13 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: dict | None = 
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
     for body in scene.solid.bodies if scene.solid else ():
         lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
-    count = steps(scene, layout)
     lines += [
         _line("memory", _memory(resources)),
         _line("output", _output(resources)),
-        _line("steps", f"about {count:,}, if no wave becomes faster than the first ones"),
-        _line("time", _time(resources, count, threads, bench)),
+        _line("steps", f"about {resources.steps:,}, if no wave becomes faster than the first ones"),
+        _line("time", _time(resources, threads, bench)),
     ]
-    return "\n".join(lines + [_line("advice", text) for text in advice(scene, layout)])
+    return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
 
 
 def _line(name: str, text: str) -> str:
@@ -74,10 +71,10 @@ def _output(resources: Resources) -> str:
     return f"{times} field outputs of about {format_bytes(each)}, {total}"
 
 
-def _time(resources: Resources, count: int, threads: int, bench: dict | None) -> str:
+def _time(resources: Resources, threads: int, bench: dict | None) -> str:
     if bench is None:
         return "unknown: `python -m distfsi bench` measures this machine once for all"
-    seconds = resources.seconds(count, threads, bench)
+    seconds = resources.seconds(threads, bench)
     place = f"{resources.ranks} rank(s) of {threads} thread(s), by the bench of this machine"
     return f"about {format_duration(max(seconds, 1.0))} on {place}; compiling, the first time, comes on top"
 

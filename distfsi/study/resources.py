@@ -13,6 +13,7 @@ from distfsi.model import fluid_model
 from distfsi.parts.fluid import SSP_RK3
 from distfsi.scene.description import Jwl, Scene, StiffenedGas
 from distfsi.scene.packing import pack
+from distfsi.scene.signals import Layout, end_time, moving_share, steps
 from distfsi.simulation import deal_blocks
 
 PROCESS_BYTES = 265e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
@@ -20,6 +21,7 @@ PICTURE_BYTES = 30e6  # of the maps in the summary
 PARTICLE_BYTES = {1: 900.0, 2: 1000.0, 3: 1750.0}  # at the peak within a step, by dimensions
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
 PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
+SECONDS_TO_LOAD = 0.25  # what a process needs once, whatever it runs
 SECONDS_PER_FILE, BYTES_PER_SECOND = 0.01, 5e8  # of writing
 
 
@@ -39,6 +41,16 @@ class Resources:
         self.dimensions = scene.domain.dimensions
         bodies = scene.solid.bodies if scene.solid else ()
         self.positions = {body.name: pack(body, scene.domain.lower, scene.domain.upper)[0] for body in bodies}
+
+    @cached_property
+    def layout(self) -> Layout | None:
+        """Of the fluid at the start."""
+        return Layout(self.scene) if self.scene.fluid else None
+
+    @cached_property
+    def steps(self) -> int:
+        """Time steps of the run."""
+        return steps(self.scene, self.layout)
 
     @cached_property
     def blocks(self) -> list[Blocks]:
@@ -99,7 +111,7 @@ class Resources:
 
     def output_times(self) -> int:
         """How many times fields are written."""
-        every, end = self.scene.output.fields_every, self.scene.time.end
+        every, end = self.scene.output.fields_every, end_time(self.scene, self.layout)
         return 1 + (math.ceil(end / every - 1e-9) if every else 1)
 
     def output_bytes(self) -> float:
@@ -110,24 +122,26 @@ class Resources:
 
     # ---- time --------------------------------------------------------------------------------------------------------
 
-    def seconds(self, steps: int, threads: int, bench: dict) -> float:
-        """Of a run of so many steps with so many threads per rank, by a bench of the same machine.
+    def seconds(self, threads: int, bench: dict) -> float:
+        """Of the run with so many threads per rank, by a bench of the same machine.
 
-        Work per step grows with cells and particles, and is shared by all threads; the rest of a step is not.
+        Work per step grows with the cells that are not at rest and with the particles, and is shared by all threads;
+        the remainder of a step is not.
         """
+        moving = moving_share(self.scene, self.layout) if self.layout else 0.0
         threads_of_bench = bench["ranks"] * bench["threads_per_rank"]
         share = threads_of_bench / min(self.ranks * threads, max(1, self._pieces()))
         smallest = "coupled" if self.cells and self.particles else "fluid" if self.cells else "solid"
         fixed = bench[f"smallest_{smallest}"]
-        work = self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
+        work = moving * self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
         files = self.output_times() * (SECONDS_PER_FILE + self.output_bytes() / BYTES_PER_SECOND)
-        return fixed["start_seconds"] + steps * (fixed["seconds_per_step"] + share * work) + files
+        start = SECONDS_TO_LOAD + fixed["start_seconds"]
+        return start + self.steps * (fixed["seconds_per_step"] + share * work) + files
 
     def _pieces(self) -> int:
         """Into how many pieces the work can be cut: tiles and, by the hundred, particles."""
         tiles = math.prod(
-            math.ceil(n / t)
-            for n, t in zip(self.scene.domain.cells, self.scene.performance.tile_cells, strict=True)
+            math.ceil(n / t) for n, t in zip(self.scene.domain.cells, self.scene.performance.tile_cells, strict=True)
         )
         return max(tiles if self.cells else 1, self.particles // 100)
 

@@ -50,7 +50,7 @@ def crossing(position: np.ndarray, values: np.ndarray, level: float) -> float:
 
 
 def velocity(time: np.ndarray, position: np.ndarray, window: tuple[float, float]) -> float:
-    """Slope of the straight line fitted to a track within a window of time; NaN where the track does not span it."""
+    """Slope of the straight line fitted to a track within a window of time; NaN when the run ends before its middle."""
     inside = (time >= window[0]) & (time <= window[1]) & np.isfinite(position)
     covered = inside.any() and time[-1] >= window[0] + 0.5 * (window[1] - window[0])
     return float(np.polyfit(time[inside], position[inside], 1)[0]) if covered and inside.sum() > 2 else np.nan

@@ -141,12 +141,15 @@ def profile_charts(explosion: Explosion) -> list[Chart]:
 
 def maps(explosion: Explosion) -> list[Picture]:
     """Pressure at the times of the paper's Fig. 10."""
-    lower, upper = explosion.scene.domain.lower, explosion.scene.domain.upper
-    extent = (lower[0], upper[0], lower[1], upper[1])
-    return [
-        Picture(f"pressure [GPa], {1e6 * time:.0f} us", 1e-9 * read_cells(path)[1]["pressure"][0], extent, label="")
-        for time, path in series(Path(explosion.scene.output.directory), "cells")
-    ]
+    scene = explosion.scene
+    (left, right), (bottom, top) = zip(scene.domain.lower, scene.domain.upper, strict=True)
+    extent, limits = (left, right, bottom, top), (0.0, 1e-9 * scene.fluid.regions[1].state.pressure)
+    pictures = []
+    for time, path in series(Path(scene.output.directory), "cells"):
+        pressure = 1e-9 * read_cells(path)[1]["pressure"][0]
+        title = f"pressure [GPa], {1e6 * time:.0f} us"
+        pictures.append(Picture(title, pressure, extent, limits=limits, label=""))
+    return pictures
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:

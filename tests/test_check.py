@@ -1,0 +1,322 @@
+"""What `check` tells before a run, against what the run then takes."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from distfsi.mesh.communicator import Communicator
+from distfsi.scene import load
+from distfsi.scene.advice import advice
+from distfsi.scene.description import IdealGas, Jwl, StiffenedGas
+from distfsi.scene.signals import Layout, moving_share, steps
+from distfsi.scene.waves import Side, meet
+from distfsi.simulation import Simulation, deal_blocks, run
+from distfsi.study import bench
+from distfsi.study.check import report
+from distfsi.study.exact import PureState, exact_riemann
+from distfsi.study.references import AIR, WATER_AIR
+from distfsi.study.resources import Resources
+from distfsi.study.works import SMALLEST, blast_on_copper, gases
+from launch import ROOT, run_ranks
+
+INPUTS = sorted((ROOT / "inputs").glob("*.toml"))
+TUBE, SOD, IMPACT = (ROOT / "inputs" / f"{name}.toml" for name in ("steel_tube", "sod", "plate_impact"))
+
+
+def advised(scene):
+    return list(advice(scene, Layout(scene) if scene.fluid else None))
+
+
+# ---- the report ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
+def test_every_example_gets_a_report_without_advice(path):
+    scene = load(path)
+    text = report(scene)
+    assert text.startswith(scene.title)
+    assert advised(scene) == []
+    for name in ("domain", "blocks", "memory", "output", "steps", "time"):
+        assert f"\n  {name} " in text
+    assert "python -m distfsi bench" in text
+
+
+def test_the_report_counts_what_the_scene_holds():
+    text = report(load(TUBE, ["domain.cells=[160, 160]", "solid.bodies.tube.spacing=0.25 mm"]), ranks=2)
+    assert "25,600 cells" in text
+    assert re.search(r"6 of 128 x 64 cells; (\d) to (\d) on each of 2 ranks", text)
+    assert "16 particles, 8 cells" in text
+    assert "3 have none" in report(load(SOD, ["performance.block_cells=400"]), ranks=4)
+
+
+def test_check_by_the_command_line(tmp_path, monkeypatch):
+    command = [sys.executable, "-m", "distfsi", "check", str(SOD), "--ranks", "2"]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert told.returncode == 0 and told.stderr == ""
+    assert told.stdout.startswith("Sod's shock tube\n")
+
+
+# ---- steps -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "eos"),
+    [
+        ((PureState(1.0, 1.0), Side(IdealGas(1.4), 1.0, 1.0, 0.0)),
+         (PureState(0.125, 0.1), Side(IdealGas(1.4), 0.125, 0.1, 0.0)), (AIR, AIR)),
+        ((WATER_AIR.left, Side(StiffenedGas(4.4, 6e8), 1000.0, 1e9, 0.0)),
+         (WATER_AIR.right, Side(IdealGas(1.4), 50.0, 1e5, 0.0)), (WATER_AIR.eos_left, WATER_AIR.eos_right)),
+    ],
+    ids=["sod", "water_air"],
+)  # fmt: skip
+def test_meeting_states_form_those_of_the_exact_solution(left, right, eos):
+    exact = exact_riemann(left[0], right[0], *eos)
+    states = meet(left[1], right[1])
+    assert [state.velocity for state in states[1:3]] == pytest.approx([exact.u_star] * 2, rel=1e-4)
+    assert states[0].velocity == states[3].velocity == 0.0
+
+
+def test_burnt_tnt_in_air():
+    tnt, air = Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3), IdealGas(1.4)
+    _, products, shocked, _ = meet(Side(tnt, 1630.0, 8.376e9, 0.0), Side(air, 1.225, 101325.0, 0.0))
+    assert products.velocity == shocked.velocity > 3000.0
+    strong = 0.5 * 2.4 * 1.225 * shocked.velocity**2  # pressure behind a strong shock in air, (gamma + 1)/2 rho u^2
+    assert shocked.sound == pytest.approx((1.4 * strong / (6.0 * 1.225)) ** 0.5, rel=0.02)
+
+
+def test_vacuum_and_tension_do_not_stop_the_estimate():
+    air, water = IdealGas(1.4), StiffenedGas(4.4, 6e8)
+    apart = meet(Side(air, 1.0, 1.0, -20.0), Side(air, 1.0, 1.0, -20.0))
+    assert [state.velocity for state in apart] == [-20.0, 20.0]
+    assert len(meet(Side(water, 1000.0, -1e5, 0.0), Side(water, 1000.0, 1e5, 0.0))) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("sod", []),
+        ("water_air", []),
+        ("plate_impact", []),
+        ("steel_tube", ["domain.cells=[48, 48]", "solid.bodies.tube.spacing=0.8 mm", "time.end=4 us"]),
+        ("steel_tube_full", ["domain.cells=[80, 80]", "solid.bodies.tube.spacing=1 mm", "time.end=4 us"]),
+        ("shock_bubble", ["domain.cells=[130, 36]", "time.end=50"]),
+    ],
+)
+def test_steps_are_those_of_the_run(tmp_path, name, changes):
+    scene = load(ROOT / "inputs" / f"{name}.toml", [*changes, f'output.directory="{tmp_path}"'])
+    taken = run(scene, Communicator(), threads=1).steps
+    assert steps(scene, Layout(scene) if scene.fluid else None) == pytest.approx(taken, rel=0.25)
+
+
+# ---- memory and output -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", [gases((40, 30), (IdealGas(1.4),), (1.0, 2.0), (1.0, 1.0)), blast_on_copper(24, 3)])
+def test_fields_are_those_of_the_run(scene):
+    resources = Resources(scene, 1)
+    simulation = Simulation.of(scene, Communicator(), 1)
+    cells, _ = simulation.outputs()
+    made = simulation.fluid.memory() + sum(field.nbytes for field in cells.values())
+    if simulation.coupling:
+        made += simulation.coupling.kind.nbytes + simulation.coupling.kind.size * 8 * scene.domain.dimensions
+        assert resources.particles == len(simulation.solid.columns["id"])
+    assert resources.field_bytes(simulation.blocks) == made
+
+
+@pytest.mark.parametrize("name", ["sod", "plate_impact", "steel_tube"])
+def test_files_are_as_large_as_told(tmp_path, name):
+    changes = ["time.maximum_steps=2", "domain.cells=[64, 64]", "solid.bodies.tube.spacing=0.5 mm"]
+    changes = changes if name == "steel_tube" else changes[:1]
+    scene = load(ROOT / "inputs" / f"{name}.toml", [*changes, f'output.directory="{tmp_path}"'])
+    run(scene, Communicator(), threads=1)
+    written = sum(path.stat().st_size for path in tmp_path.glob("*-000000.vtkhdf"))
+    overhead = 60e3  # of HDF5
+    assert Resources(scene, 1).output_bytes() == pytest.approx(written, rel=0.1, abs=overhead)
+
+
+def test_all_blocks_and_particles_are_counted_on_any_number_of_ranks():
+    scene = load(TUBE)
+    one, three = Resources(scene, 1), Resources(scene, 3)
+    assert [blocks.local_count for blocks in one.blocks] == [6]
+    assert sum(blocks.local_count for blocks in three.blocks) == 6
+    assert three.particles_of_ranks.sum() == one.particles == one.particles_of_ranks[0]
+    assert np.array_equal(deal_blocks(scene, Communicator()).owners, one.blocks[0].owners)
+    assert three.memory() < one.memory()
+
+
+MEMORY = """
+import resource, sys
+from distfsi.__main__ import main
+main(["run", *sys.argv[1:]])
+print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
+def test_memory_is_that_of_the_run(tmp_path, path, ranks):
+    """Within 10 %, kernels compiled before."""
+    changes = ["--set", "time.maximum_steps=20", "--set", f"output.directory={tmp_path}"]
+    for _ in range(2):  # the first run compiles, which takes memory of its own
+        told = run_ranks(ranks, ["-c", MEMORY, str(path), "--threads", "1", *changes], 280)
+    peak = max(float(line.split()[1]) for line in told.splitlines() if line.startswith("peak"))
+    assert Resources(load(path), ranks).memory() == pytest.approx(peak, rel=0.1)
+
+
+# ---- time ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """A bench is kept in a place of its own."""
+    monkeypatch.setattr(bench, "cache_directory", lambda: tmp_path)
+
+
+def test_a_bench_is_kept_for_this_version_only(kept, monkeypatch):
+    assert bench.kept_bench() is None
+    bench._keep({"distfsi": bench.__version__, "ranks": 1})
+    assert bench.kept_bench()["ranks"] == 1
+    monkeypatch.setattr(bench, "__version__", "another")
+    assert bench.kept_bench() is None
+
+
+def test_a_partial_bench_is_printed_but_not_kept(kept, capsys):
+    result = bench.main(Communicator(), 1, "smallest_fluid", seconds=0.01)
+    assert json.loads(capsys.readouterr().out) == result
+    assert result["smallest_fluid"]["seconds_per_step"] > 0.0
+    assert bench.kept_bench() is None
+
+
+RATES = {
+    "ranks": 1,
+    "threads_per_rank": 1,
+    **{f"smallest_{name}": {"start_seconds": 1.0, "seconds_per_step": 1e-3} for name in SMALLEST},
+    **{f"shock_bubble_{d}d": {"cell_stages_per_second": 3e7 / d} for d in (1, 2, 3)},
+    "shock_bubble_2d_float32": {"cell_stages_per_second": 3e7},
+    **{f"{name}_2d": {"cell_stages_per_second": 6e6} for name in ("water_air", "tnt_air", "euler")},
+    **{f"copper_block_{d}d": {"particle_steps_per_second": 1e6} for d in (1, 2, 3)},
+    "blast_on_copper_2d": {"cells": 1000, "particles": 1000, "particle_steps_per_second": 4e5},
+    "blast_on_copper_3d": {"cells": 1000, "particles": 1000, "particle_steps_per_second": 1e5},
+}
+
+
+def test_the_time_is_start_and_steps_and_files():
+    def seconds(path, ranks, threads, *changes):
+        resources = Resources(load(path, changes), ranks)
+        files = resources.output_times() * (0.01 + resources.output_bytes() / 5e8)
+        return (resources.seconds(threads, RATES) - 1.25 - files) / resources.steps
+
+    bubble, whole = ROOT / "inputs" / "shock_bubble.toml", "performance.tile_cells=[128, 64]"
+    one, four = seconds(bubble, 1, 1), seconds(bubble, 2, 2)
+    assert 0.9 * 3 * 462800 / 1.5e7 < one - 1e-3 < 3 * 462800 / 1.5e7
+    assert four - 1e-3 == pytest.approx((one - 1e-3) / 4)
+    tube = Resources(load(TUBE), 1)
+    moving = moving_share(tube.scene, tube.layout)
+    coupled = 1e-3 + moving * 3 * tube.cells / 6e6 + tube.particles * (2.5e-6 - 3 / 6e6)
+    assert seconds(TUBE, 1, 1) == pytest.approx(coupled)
+    assert seconds(bubble, 1, 1, "time.maximum_steps=10", whole) < 0.5 * one  # most of the air is still at rest
+    assert "on 2 rank(s) of 1 thread(s), by the bench of this machine" in report(tube.scene, 2, 1, RATES)
+
+
+@pytest.mark.full
+def test_the_time_is_that_of_the_run(tmp_path):
+    """Within a factor of 1.5 on a machine that does nothing else; the best of three runs; the first compiles."""
+    measured = bench.main(Communicator(), 1, None, seconds=0.2)
+    for path in INPUTS:
+        changes = ["time.maximum_steps=200", f"output.directory={tmp_path}"]
+        options = [word for change in changes for word in ("--set", change)]
+        command = [sys.executable, "-m", "distfsi", "run", str(path), "--threads", "1", *options]
+        told = [subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout for _ in range(3)]
+        taken = min(float(text.split(" steps in ")[1].split()[0]) for text in told)
+        expected = Resources(load(path, changes), 1).seconds(1, measured)
+        assert taken / 1.5 < expected < taken * 1.5, (path.stem, expected, taken)
+
+
+# ---- advice ----------------------------------------------------------------------------------------------------------
+
+
+def test_advice_on_what_looks_wrong():
+    changes = ["solid.bodies.tube.spacing=0.35 mm", "output.fields_every=1", "domain.cells=[160, 80]"]
+    told = "\n".join(advised(load(TUBE, [*changes, "fluid.regions.1.phase=air", "fluid.regions.1.density=1"])))
+    for words in ("0.7 cells apart", "longer than the run", "2 times longer than wide", "'products' is nowhere"):
+        assert words in told
+    thin = "\n".join(advised(load(TUBE, ["solid.bodies.tube.shape.inner_radius=0.0335"])))
+    assert "fewer than 4 particles" in thin
+    assert "thinner than sqrt(2) cells" in thin
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "words"),
+    [
+        ("sod", ["fluid.regions.1.shape.point=2"], "nothing moves"),
+        ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
+        ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
+        ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
+        ("shock_bubble", ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],
+         "nothing varies along y: 1 dimension(s) without it"),
+        ("shock_bubble", ["domain.cells=[4875, 1335]"], "750 cells across"),
+        ("steel_tube", ["time.end=1 us"], "no wave comes nearer to the high y end than 0.0"),
+    ],
+)  # fmt: skip
+def test_excess_is_named(name, changes, words):
+    told = advised(load(ROOT / "inputs" / f"{name}.toml", changes))
+    assert sum(words in text for text in told) == 1
+
+
+def test_the_share_of_the_domain_that_waves_reach():
+    def share(*changes):
+        scene = load(SOD, ["performance.tile_cells=10", *changes])
+        return moving_share(scene, Layout(scene))
+
+    reach = 2.19157 * 0.2  # fastest signal times end: all tiles within it compute, half of the time on average
+    assert share() == pytest.approx(2 * reach / 2, abs=0.03)
+    assert share("time.end=20") == pytest.approx(1.0, abs=0.02)
+    assert share("performance.tile_cells=400") == 1.0
+    assert share("fluid.regions.1.shape.point=2") == 0.0
+    assert share("fluid.regions.1.shape.point=2", "domain.gravity=9.81") == 1.0
+
+
+BLAST = """
+[domain]
+lower = [-1, -1, 0]
+upper = [1, 1, 2]
+cells = [40, 40, 40]
+[time]
+end = "1 ms"
+[fluid.phases]
+air = {eos = "ideal_gas", gamma = 1.4}
+[[fluid.regions]]
+phase = "air"
+density = 1.2
+pressure = 1e5
+[[fluid.regions]]
+phase = "air"
+density = 1.2
+pressure = 1e7
+shape = {kind = "ball", center = [0, 0, 0.5], radius = 0.2}
+"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "axes"),
+    [
+        ([], ["x"]),  # a single ball is symmetric about all three; one is enough to tell
+        (['domain.z=["wall", "outflow"]'], ["z"]),
+        (['domain.z=["wall", "outflow"]', "fluid.regions.0.velocity=[1, 0, 0]"], []),
+        (['domain.z=["wall", "outflow"]', 'domain.x=["wall", "outflow"]'], []),
+        (['domain.x=["symmetry", "outflow"]', "domain.lower=[0, -1, 0]", "domain.cells=[20, 40, 40]",
+          'domain.z=["wall", "outflow"]'], []),
+        (['domain.z=["wall", "outflow"]', "domain.gravity=[0, 0, -9.81]"], ["z"]),
+        (["fluid.regions.1.shape={kind='box', lower=[-0.1, -0.1, 0], upper=[0.1, 0.1, 1]}"], []),
+    ],
+)  # fmt: skip
+def test_a_line_of_symmetry_in_three_dimensions_is_named(tmp_path, changes, axes):
+    path = tmp_path / "blast.toml"
+    path.write_text(BLAST)
+    told = [text for text in advised(load(path, changes)) if "symmetric about a line" in text]
+    assert [text.split("along ")[1][0] for text in told] == axes

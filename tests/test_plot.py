@@ -1,0 +1,248 @@
+"""Pictures and words about the results of runs, from the files that runs leave."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage, imread
+from PIL import Image
+
+from distfsi.__main__ import main
+from distfsi.errors import Diverged, InputError
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.fields import read_cells, read_layer, series
+from distfsi.output.frames import Film
+from distfsi.output.info import describe
+from distfsi.output.journal import Journal, read_journal
+from distfsi.output.plot import plot
+from distfsi.scene import load
+from distfsi.simulation import run
+from launch import ROOT
+
+SPACE = """
+title = "A ball of gas and a plate"
+[domain]
+lower = [0, 0, -0.5]
+upper = [1.6, 0.8, 0.5]
+cells = [16, 8, 10]
+[time]
+end = 1
+maximum_steps = 3
+[fluid.phases]
+gas = {eos = "ideal_gas", gamma = 1.4}
+[[fluid.regions]]
+phase = "gas"
+density = 1
+pressure = 1
+[[fluid.regions]]
+phase = "gas"
+density = 2
+pressure = 10
+shape = {kind = "ball", center = [0.4, 0.4, 0], radius = 0.25}
+[solid.bodies.plate]
+shape = {kind = "box", lower = [1.0, 0.2, -0.2], upper = [1.2, 0.6, 0.2]}
+spacing = 0.05
+density = 10
+eos = {kind = "linear", bulk_modulus = 100}
+strength = "none"
+[gauges]
+point = {kind = "point", position = [0.8, 0.4, 0]}
+line = {kind = "line", from = [0.1, 0.4, 0], to = [1.5, 0.4, 0], points = 9, every = 1e-9}
+cut = {kind = "plane", axis = "x", position = 0.4, every = 0.5}
+body = {kind = "body", body = "plate"}
+"""
+
+
+@pytest.fixture(scope="module")
+def space(tmp_path_factory):
+    """Output directory of a short coupled run in three dimensions, with gauges."""
+    folder = tmp_path_factory.mktemp("space")
+    (folder / "space.toml").write_text(SPACE)
+    run(load(folder / "space.toml", [f'output.directory="{folder}/out"']), Communicator(), threads=1)
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory):
+    """Output directory of Sod's tube."""
+    folder = tmp_path_factory.mktemp("line")
+    changes = [f'output.directory="{folder}"', "output.fields_every=0.1", "domain.cells=50"]
+    run(load(ROOT / "inputs" / "sod.toml", changes), Communicator(), threads=1)
+    return folder
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """The figures saved by the test."""
+    saved, save = [], Figure.savefig
+
+    def note(figure, *arguments, **options):
+        saved.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", note)
+    return saved
+
+
+def assert_tidy(figure):
+    """Panels with labels, on the sheet, apart from each other."""
+    panels = [axes for axes in figure.findobj(Axes) if axes.get_visible()]
+    boxes = [axes.get_tightbbox() for axes in panels]
+    sheet = figure.bbox
+    for i, box in enumerate(boxes):
+        assert sheet.x0 <= box.x0 < box.x1 <= sheet.x1 and sheet.y0 <= box.y0 < box.y1 <= sheet.y1
+        for other in boxes[:i]:
+            assert min(box.x1, other.x1) <= max(box.x0, other.x0) or min(box.y1, other.y1) <= max(box.y0, other.y0)
+    assert any(axes.get_xlabel() for axes in panels) and any(axes.get_ylabel() for axes in panels)
+
+
+# ---- plot ------------------------------------------------------------------------------------------------------------
+
+
+def test_profiles_of_all_times_on_the_same_axes(line, figures):
+    paths = list(plot(line))
+    names = [f"profiles-{number:06d}.png" for number in range(3)]
+    assert [path.name for path in paths] == [*names, "history.png"]
+    assert all(imread(path).ndim == 3 for path in paths)
+    for figure in figures:
+        assert_tidy(figure)
+    limits = [[axes.get_ylim() for axes in figure.axes] for figure in figures[:3]]
+    assert limits[0] == limits[1] == limits[2]
+
+
+def test_maps_of_a_slice_with_particles(space, figures):
+    paths = list(plot(space, field="density", particles="speed", slice=(1, 0.35), every=2))
+    assert [path.name for path in paths] == ["density-000000.png", "history.png"]
+    (image,) = figures[0].findobj(AxesImage)[:1]
+    _, fields, _, _ = read_cells(series(space, "cells")[0][1])
+    assert np.array_equal(image.get_array().filled(np.nan), fields["density"][:, 3], equal_nan=True)
+    first = figures[0].axes[0]
+    assert (first.get_xlabel(), first.get_ylabel()) == ("x [m]", "z [m]")
+    assert image.get_extent() == pytest.approx([0.0, 1.6, -0.5, 0.5])
+    for figure in figures:
+        assert_tidy(figure)
+
+
+def test_the_frame_nearest_to_a_time(line, figures):
+    assert [path.name for path in plot(line, time=0.12)] == ["profiles-000001.png"]
+
+
+def test_a_movie_holds_all_frames(space, line):
+    paths = list(plot(space, movie=True))
+    assert paths[2].name == "pressure.gif"
+    with Image.open(paths[2]) as movie:
+        assert movie.n_frames == 2
+    assert list(plot(line, movie=True))[3].name == "profiles.gif"
+
+
+def test_gauges(space, figures):
+    paths = [path.name for path in plot(space, gauges=True)]
+    assert paths == ["gauge-body.png", "gauge-line.png", "gauge-point.png", "pressure-000000.png"]
+    for figure in figures[:3]:
+        assert_tidy(figure)
+    assert len(figures[1].axes[0].lines) == 4  # times of the line
+    assert (figures[3].axes[0].get_xlabel(), figures[3].axes[0].get_ylabel()) == ("y [m]", "z [m]")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"field": "presure"}, "--field presure: no such field; there are density, pressure, velocity"),
+        ({"particles": "colour"}, "--particles colour: no such field"),
+        ({"slice": (2, 0.7)}, "outside of the domain along z"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(space, options, words):
+    with pytest.raises(InputError, match=words):
+        list(plot(space, **options))
+
+
+def test_what_is_not_there_is_told(tmp_path, line):
+    for call in (lambda: list(plot(tmp_path)), lambda: describe(tmp_path), lambda: list(plot(line, gauges=True))):
+        with pytest.raises(InputError, match="no "):
+            call()
+    with pytest.raises(InputError, match="only three dimensions"):
+        list(plot(line, slice=(0, 0.5)))
+    assert not list(tmp_path.iterdir())
+
+
+def test_plot_by_the_command_line(line, tmp_path, capsys):
+    main(["plot", str(line), "--time", "100 ms"])
+    assert capsys.readouterr().out == f"{line}/plots/profiles-000001.png\n"
+    for wrong in (["--time", "1 kg"], ["--slice", "w=1"], ["--every", "0"], ["--time", "1", "--every", "2"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["plot", str(line), *wrong])
+        assert ended.value.code == 2
+    command = [sys.executable, "-m", "distfsi", "plot", str(tmp_path)]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert (told.returncode, told.stderr) == (2, f"{tmp_path}: no field files in {tmp_path}\n")
+
+
+# ---- frames ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_layer_is_that_of_the_whole_field(space):
+    path = series(space, "cells")[-1][1]
+    time, fields, lower, spacing = read_cells(path)
+    for axis, (place, layer) in enumerate([(0.81, 8), (0.01, 0), (0.49, 9)]):
+        found, layers, (low, high) = read_layer(path, axis, place, ["pressure", "velocity"])
+        assert found == time
+        for name in ("pressure", "velocity"):
+            assert np.array_equal(layers[name], np.take(fields[name], layer, axis=2 - axis), equal_nan=True)
+        assert low[axis] == pytest.approx(lower[axis] + layer * spacing[axis])
+        assert high[axis] == pytest.approx(low[axis] + spacing[axis])
+    with pytest.raises(KeyError):
+        read_layer(path, 2, None, ["nothing"])
+
+
+def test_particles_of_a_slice_lie_near_it(space):
+    film = Film(space, (1, 0.3))
+    assert film.cell_fields == ["density", "pressure", "velocity"]
+    assert "plastic_strain" in film.particle_fields
+    (frame,) = film.frames([0])
+    assert frame.axes == (0, 2)
+    assert 0 < len(frame.particles["position"]) < 4 * 8 * 8
+    assert np.abs(frame.particles["position"][:, 1] - 0.3).max() <= 0.5 * frame.spacing + 1e-12
+
+
+# ---- info ------------------------------------------------------------------------------------------------------------
+
+
+def test_info_tells_what_a_folder_holds(space, capsys):
+    main(["info", str(space)])
+    text = capsys.readouterr().out
+    assert text.startswith("A ball of gas and a plate\n  ended      done after ")
+    assert "on 1 rank(s) of 1 thread(s)" not in text and "1 rank(s) of 1 thread(s)" in text
+    assert "after 3 steps" in text
+    assert "cells      2 time(s) from 0 s to " in text
+    assert "density, pressure, velocity" in text
+    assert "gauges     body, cut, line, point" in text
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "told"),
+    [
+        (None, "done", "done after"),
+        (Diverged("no valid state\nlast files"), "diverged", "ended by an invalid state after"),
+        (RuntimeError("broken"), "failed", "ended by an error after"),
+    ],
+)
+def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
+    scene = load(ROOT / "inputs" / "sod.toml")
+    try:
+        with Journal(tmp_path, scene, Communicator(), 3):
+            assert read_journal(tmp_path)["status"] == "running"
+            assert "still running" in describe(tmp_path)
+            if error:
+                raise error
+    except type(error or KeyError()):
+        pass
+    notes = json.loads((tmp_path / "run.json").read_text())
+    assert (notes["status"], notes["title"], notes["threads per rank"]) == (status, scene.title, 3)
+    assert told in describe(tmp_path)
+    if error:
+        assert f"because    {notes['message'].splitlines()[0]}" in describe(tmp_path)
