@@ -11,13 +11,13 @@ from launch import ROOT, run_ranks
 
 TUBE = (
     ROOT / "inputs/steel_tube.toml",
-    "--set", "domain.cells=[56, 56]",
-    "--set", "domain.upper=['56 mm', '56 mm']",
+    "--set", "domain.cells=[40, 40]",
+    "--set", "domain.upper=['40 mm', '40 mm']",
     "--set", "solid.bodies.tube.spacing=0.6 mm",
-    "--set", "time.maximum_steps=100",
+    "--set", "time.maximum_steps=60",
     "--set", "output.fields_every=0",
 )  # fmt: skip
-BLOCKS = {"small": ("[16, 8]", "[16, 4]"), "large": ("[32, 56]", "[16, 24]")}
+BLOCKS = {"small": ("[16, 8]", "[16, 4]"), "large": ("[32, 40]", "[16, 24]")}
 
 
 def final_state(directory):
@@ -30,7 +30,7 @@ def final_state(directory):
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    """The tube after 100 steps on one rank and one thread, with small blocks."""
+    """The tube after 60 steps on one rank and one thread, with small blocks."""
     return run_tube(tmp_path_factory.mktemp("reference"), 1, 1, "small")
 
 
@@ -91,6 +91,7 @@ def rest(tmp_path, first, second, cells):
     return before, simulation.fluid.cells(0)
 
 
+@pytest.mark.full  # the stage itself is held to this for every pair in test_formulas.py
 @pytest.mark.parametrize("first", [GAS, WATER, TNT], ids=["gas", "water", "tnt"])
 @pytest.mark.parametrize("second", [None, GAS, WATER, TNT], ids=["alone", "gas", "water", "tnt"])
 def test_a_uniform_state_at_rest_does_not_change_a_bit(tmp_path, first, second):
@@ -162,7 +163,7 @@ def shock_tube(tmp_path, dimensions, axis):
     return line
 
 
-@pytest.mark.parametrize(("dimensions", "axis"), [(2, 0), (2, 1), (3, 0), (3, 1), (3, 2)])
+@pytest.mark.parametrize(("dimensions", "axis"), [(2, 1), (3, 0), (3, 1), (3, 2)])
 def test_a_shock_tube_is_the_same_along_every_axis(tmp_path, dimensions, axis):
     """Direction and number of dimensions are parameters: a tube along any axis has the bits of the 1-D tube."""
     np.testing.assert_array_equal(shock_tube(tmp_path, dimensions, axis), shock_tube(tmp_path, 1, 0))

@@ -14,6 +14,7 @@ from PIL import Image
 from distfsi.__main__ import main
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.output import fields
 from distfsi.output.fields import read_cells, read_layer, series
 from distfsi.output.frames import Film
 from distfsi.output.info import describe
@@ -197,6 +198,16 @@ def test_a_layer_is_that_of_the_whole_field(space):
         assert high[axis] == pytest.approx(low[axis] + spacing[axis])
     with pytest.raises(KeyError):
         read_layer(path, 2, None, ["nothing"])
+
+
+def test_large_layers_are_thinned_out(space, monkeypatch):
+    path = series(space, "cells")[0][1]
+    _, whole, corners = read_layer(path, 1, 0.3)
+    monkeypatch.setattr(fields, "LARGEST_LAYER", 7)  # of 16 x 10 cells
+    _, thin, same_corners = read_layer(path, 1, 0.3)
+    for name, values in thin.items():
+        assert np.array_equal(values, whole[name][::2, ::3], equal_nan=True)
+    assert np.array_equal(corners, same_corners)
 
 
 def test_particles_of_a_slice_lie_near_it(space):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ from distfsi.study.exact import PureState, RiemannSolution, exact_riemann
 BLOCKS = {1: (512,), 2: (128, 64), 3: (32, 32, 32)}
 TRACE = 1e-6
 OPEN = ("outflow", "outflow")
+PERIODIC = ("periodic", "periodic")
 
 
 def scene_of(
@@ -38,6 +40,7 @@ def scene_of(
     boundaries: tuple[tuple[str, str], ...] | None = None,
     cfl: float = 0.5,
     scheme: str = "rk3",
+    performance: Performance | None = None,
     **method: object,
 ) -> Scene:
     """A scene of one or two materials; `method`: what differs from minmod and HLLC in float64."""
@@ -55,7 +58,7 @@ def scene_of(
         fluid=fluid,
         solid=None,
         output=Output("", 0.0, 10),
-        performance=Performance(BLOCKS[dimensions], BLOCKS[dimensions]),
+        performance=performance or Performance(BLOCKS[dimensions], BLOCKS[dimensions]),
     )
 
 
@@ -89,6 +92,26 @@ def centers(simulation: Simulation) -> list[np.ndarray]:
     return [low + h * (np.arange(n) + 0.5) for low, h, n in parts]
 
 
+def radii(simulation: Simulation) -> list[np.ndarray]:
+    """Distance (z, y, x) of the active cells of each block from the origin [m]."""
+    D, blocks = simulation.fluid.model.dimensions, simulation.blocks
+    result = []
+    for block in range(blocks.local_count):
+        grid = np.meshgrid(*blocks.cell_centers(block)[2::-1], indexing="ij")[::-1]
+        result.append(np.sqrt(sum(x**2 for x in grid[:D])))
+    return result
+
+
+def radial_mean(simulation: Simulation, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of a field in rings as wide as a cell: their radii and values; up to the nearest side of the domain."""
+    grid = np.meshgrid(*centers(simulation)[::-1], indexing="ij")
+    r = np.sqrt(sum(x**2 for x in grid)).ravel()
+    h, upper = simulation.scene.domain.spacing[0], min(simulation.scene.domain.upper)
+    ring, count = (r / h).astype(int), int(round(upper / h))
+    number = np.bincount(ring)[:count]
+    return h * (np.arange(count) + 0.5), np.bincount(ring, fields(simulation)[name].ravel())[:count] / number
+
+
 @dataclass(frozen=True)
 class Tube:
     """Two states that meet at `interface` on [lower, upper] m, looked at after `time` s."""
@@ -117,10 +140,8 @@ class Tube:
     def run(self, cells: int, **method: object) -> Profile:
         """The profile at the end."""
         simulation = advance(start(self.scene(cells, **method)))
-        found = fields(simulation)
-        return Profile(
-            self, centers(simulation)[0], *(found[name][0, 0] for name in ("density", "velocity", "pressure"))
-        )
+        density, velocity, pressure = (fields(simulation)[name][0, 0] for name in ("density", "velocity", "pressure"))
+        return Profile(self, centers(simulation)[0], density, velocity[:, 0], pressure)
 
 
 @dataclass(frozen=True)
@@ -133,9 +154,9 @@ class Profile:
     velocity: np.ndarray
     pressure: np.ndarray
 
-    def __post_init__(self) -> None:
-        if self.velocity.ndim == 2:
-            object.__setattr__(self, "velocity", self.velocity[:, 0])
+    @property
+    def spacing(self) -> float:
+        return self.x[1] - self.x[0]
 
     @property
     def values(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -147,13 +168,21 @@ class Profile:
 
     def errors(self) -> np.ndarray:
         """L1 errors of density, velocity and pressure."""
-        h = self.x[1] - self.x[0]
-        return np.array([np.abs(a - b).sum() * h for a, b in zip(self.values, self.exact(), strict=True)])
+        return np.array([np.abs(a - b).sum() * self.spacing for a, b in zip(self.values, self.exact(), strict=True)])
 
     def shock(self) -> tuple[float, float]:
         """Where the right shock is, half-way up its pressure step, and where it should be [m]."""
-        solution, h = self.tube.exact, self.x[1] - self.x[0]
+        solution = self.tube.exact
         level = 0.5 * (solution.p_star + self.tube.right.pressure)
         last = np.flatnonzero(self.pressure > level)[-1]
         part = (self.pressure[last] - level) / (self.pressure[last] - self.pressure[last + 1])
-        return self.x[last] + part * h, self.tube.interface + solution.right_wave.head * self.tube.time
+        return self.x[last] + part * self.spacing, self.tube.interface + solution.right_wave.head * self.tube.time
+
+    def plateaus(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Mean (density, velocity, pressure) well between the left wave, the contact and the right wave, and exact."""
+        solution = self.tube.exact
+        speeds = (solution.left_wave.tail, solution.u_star, solution.right_wave.tail)
+        ends = [self.tube.interface + speed * self.tube.time for speed in speeds]
+        for low, high, rho in zip(ends, ends[1:], (solution.rho_star_left, solution.rho_star_right), strict=False):
+            inside = np.abs(self.x - 0.5 * (low + high)) < 0.2 * (high - low)
+            yield np.array([v[inside].mean() for v in self.values]), np.array([rho, solution.u_star, solution.p_star])

@@ -20,6 +20,7 @@ import numpy as np
 from distfsi.output.interfaces import Blocks, Communicator, Grid
 from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_root, replace, write_complete
 
+LARGEST_LAYER = 1000  # cells along an axis that a picture takes
 KINDS = ("cells", "particles")
 
 Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype]]  # of one cell's or particle's value, and its type, by name
@@ -128,8 +129,9 @@ def read_layer(
     """Time [s], fields (nv, nh) or (nv, nh, 3) and corners, low and high (3,) [m], of a layer of cells of a cells file.
 
     It is the one that the plane normal to axis `normal` at `place` [m] (None: the middle) passes through; nh cells
-    along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all. Raises
-    ValueError when the plane passes by or there is nothing to cut, KeyError when there is no such field.
+    along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all; of large
+    layers only each so many cells, for more than LARGEST_LAYER along an axis are too fine to be seen. Raises ValueError
+    when the plane passes by or there is nothing to cut, KeyError when there is no such field.
     """
     with h5py.File(path) as file:
         root = file["VTKHDF"]
@@ -141,9 +143,11 @@ def read_layer(
         layer = cells[normal] // 2 if place is None else int(np.floor((place - low[normal]) / spacing[normal]))
         if not 0 <= layer < cells[normal]:
             raise ValueError(f"the plane at {place:g} m lies outside of the domain along {'xyz'[normal]}")
-        chosen = [slice(None)] * 3
-        chosen[2 - normal] = layer
-        shape = [cells[axis] for axis in (2, 1, 0) if axis != normal]
+        others = [axis for axis in (2, 1, 0) if axis != normal]
+        steps = [-(-cells[axis] // LARGEST_LAYER) if cells[others].min() > 1 else 1 for axis in others]
+        chosen = [slice(None, None, step) for step in steps]
+        chosen.insert(2 - normal, layer)
+        shape = [-(-cells[axis] // step) for axis, step in zip(others, steps, strict=True)]
         data = root["CellData"]
         fields = {
             name: data[name][tuple(chosen[3 - dimensions :])].reshape(*shape, *data[name].shape[dimensions:])

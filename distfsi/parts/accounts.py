@@ -80,6 +80,7 @@ class Accounts:
                 book(f"ledger {cause}", amounts, -1.0)
         if np.isnan(self._start).all():
             self._start = balance
+        size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
         self._scale = np.maximum(self._scale, size)
         drift = (balance - self._start) / np.where(self._scale > 0.0, self._scale, 1.0)
         return values | {f"drift {name}": d for name, d in zip(self._names, drift, strict=True)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Container, Iterator, Mapping
 
@@ -10,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from distfsi.scene.build import AXES, SIDES
-from distfsi.scene.description import Body, Domain, Fluid, FluidState, HalfSpace, Solid, Tube
+from distfsi.scene.description import Ball, Body, Domain, Fluid, FluidState, HalfSpace, Solid, Tube
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.packing import pack
 from distfsi.scene.schema import (
@@ -31,6 +32,7 @@ from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
+MOST_CELLS, MOST_PARTICLES = 1e11, 1e8
 CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
 
 
@@ -72,6 +74,8 @@ def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(("domain", "upper"), f"must be greater than lower along {AXES[axis]}")
         if domain.boundaries[axis].count("periodic") == 1:
             yield Fault(path, "one end is periodic; expected both or none")
+    if (count := math.prod(domain.cells)) > MOST_CELLS:
+        yield Fault(("domain", "cells"), f"{count:.1e} cells; at most {MOST_CELLS:.0e}")
 
 
 def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
@@ -129,6 +133,10 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield Fault((*path, "shape"), "a tube is packed in 2D only; not available yet in other dimensions")
             continue
         yield from _check_extent((*path, "shape"), body, domain)
+        if (count := _number_of_particles(body, domain)) > MOST_PARTICLES:
+            text = f"{body.spacing:.6g} m makes about {count:.1e} particles; at most {MOST_PARTICLES:.0e}"
+            yield Fault((*path, "spacing"), text)
+            continue
         positions, _ = pack(body, domain.lower, domain.upper)
         if len(positions) == 0:
             yield Fault((*path, "shape"), "no particle of it lies inside the domain")
@@ -137,6 +145,19 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
     for first, second in itertools.combinations(packed, 2):
         if _overlap(first, second):
             yield Fault(("solid", "bodies", second[0].name, "shape"), f"overlaps body '{first[0].name}'")
+
+
+def _number_of_particles(body: Body, domain: Domain) -> float:
+    """About how many particles it takes to pack a body."""
+    match body.shape:
+        case Tube(_, inner, outer):
+            extents = [outer - inner, math.pi * (outer + inner)]
+        case Ball(_, radius):
+            extents = [2.0 * radius] * domain.dimensions
+        case shape:
+            lower, upper = bounding_box(shape)
+            extents = np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower)
+    return math.prod(max(float(extent), 0.0) / body.spacing for extent in extents)
 
 
 def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:

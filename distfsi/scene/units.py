@@ -116,12 +116,18 @@ def to_si(value: object, unit: str) -> float:
 
     Raises ValueError when the value is no finite number or has other dimensions than `unit`.
     """
-    if isinstance(value, str):
-        return _text_to_si(value, unit)
+    try:
+        number = _text_to_si(value, unit) if isinstance(value, str) else _number_to_float(value, unit)
+    except OverflowError:
+        raise ValueError("is too large") from None
+    if not math.isfinite(number):
+        raise ValueError("is not finite")
+    return number
+
+
+def _number_to_float(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("is no number; expected one" + ("" if unit == "1" else f' or a text such as "2.5 {unit}"'))
-    if not math.isfinite(value):
-        raise ValueError("is not finite")
     return float(value)
 
 

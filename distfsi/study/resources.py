@@ -11,13 +11,13 @@ import numpy as np
 from distfsi.mesh.blocks import Blocks
 from distfsi.model import fluid_model
 from distfsi.parts.fluid import SSP_RK3
-from distfsi.scene.description import Jwl, Scene, StiffenedGas
+from distfsi.scene.description import IdealGas, Scene, StiffenedGas
 from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps
 from distfsi.simulation import deal_blocks
 
-PROCESS_BYTES = 265e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
-PICTURE_BYTES = 30e6  # of the maps in the summary
+PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
+PICTURE_BYTES = 40e6  # of the maps in the summary
 PARTICLE_BYTES = {1: 900.0, 2: 1000.0, 3: 1750.0}  # at the peak within a step, by dimensions
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
 PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
@@ -151,7 +151,7 @@ class Resources:
             return 0.0
         fluid, D = self.scene.fluid, self.dimensions
         eos = {type(phase.eos) for phase in fluid.phases}
-        two = "tnt_air" if Jwl in eos else "water_air" if StiffenedGas in eos else "shock_bubble"
+        two = "shock_bubble" if eos == {IdealGas} else "water_air" if eos <= {IdealGas, StiffenedGas} else "tnt_air"
         rate = bench[f"{two if len(fluid.phases) == 2 else 'euler'}_2d"]["cell_stages_per_second"]
         bubble = bench["shock_bubble_2d"]["cell_stages_per_second"]
         rate *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"] / bubble
