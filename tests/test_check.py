@@ -223,7 +223,7 @@ def test_the_time_is_start_and_steps_and_files():
     assert "on 2 rank(s) of 1 thread(s), by the bench of this machine" in report(tube.scene, 2, 1, RATES)
 
 
-@pytest.mark.full
+@pytest.mark.idle
 def test_the_time_is_that_of_the_run(tmp_path):
     """Within a factor of 1.5 on a machine that does nothing else; the best of three runs; the first compiles."""
     measured = bench.main(Communicator(), 1, None, seconds=0.2)

@@ -24,12 +24,13 @@ SCENES = {
     "air-3D": (("air",), 3, "float64"),
     "products-air-2D-single": (("tnt", "air"), 2, "float32"),
 }
+RIEMANN = {"water-air-2D": "hllc", "products-air-3D": "adaptive", "air-3D": "adaptive", "products-air-2D-single": "hll"}
 WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
 
 def module_text(row, scene):
     names, dimensions, real = SCENES[scene]
-    model = model_of(*names, dimensions=dimensions, limiter="van_leer")
+    model = model_of(*names, dimensions=dimensions, limiter="van_leer", riemann=RIEMANN[scene])
     return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
 
 

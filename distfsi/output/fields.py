@@ -129,9 +129,9 @@ def read_layer(
     """Time [s], fields (nv, nh) or (nv, nh, 3) and corners, low and high (3,) [m], of a layer of cells of a cells file.
 
     It is the one that the plane normal to axis `normal` at `place` [m] (None: the middle) passes through; nh cells
-    along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all; of large
-    layers only each so many cells, for more than LARGEST_LAYER along an axis are too fine to be seen. Raises ValueError
-    when the plane passes by or there is nothing to cut, KeyError when there is no such field.
+    along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all; of
+    large layers only each so many cells, for more than LARGEST_LAYER along an axis are too fine to be seen. Raises
+    ValueError when the plane passes by or there is nothing to cut, KeyError when there is no such field.
     """
     with h5py.File(path) as file:
         root = file["VTKHDF"]

@@ -20,7 +20,7 @@ from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
 COLORS = {"density": "bone_r", "schlieren": "gray_r"}  # others: OTHER_COLORS
 OTHER_COLORS, PARTICLE_COLORS = "viridis", "plasma"
 SUMMARY = ("pressure", "density")  # the fields of a summary
-BAR_RIGHT, BAR_BELOW = 1.1, 0.75  # room for a color bar beside or below panels
+BAR_RIGHT, BAR_BELOW = 1.2, 0.75  # room for a color bar beside or below panels
 HIGHEST = 11.0  # all rows of panels together
 UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps stand side by side
 DISC = 1.25  # diameter over the distance of particles: discs of a body leave no gaps

@@ -24,6 +24,7 @@ ROUNDING = 1e-12  # an energy that changes by less, relatively, is not drawn
 WIDTH = 12.0
 LEFT = 0.9  # room for the labels of an axis
 GAP, TITLE, XLABEL = 0.35, 0.4, 0.6  # between panels, above them, below the last of them
+EXPONENT = 0.2  # above a panel, for the power of ten of its axis
 PROFILE_HEIGHT, HISTORY_HEIGHT = 1.6, 3.9
 
 
@@ -105,7 +106,8 @@ def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
     places = grid_of_panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.1), (1.0, 0.0))[0]
     for axes, (title, curves) in zip(places, panels, strict=True):
         for name, values in curves.items():
-            axes.plot(time / size, values, label=re.sub(r"^drift | \[.*", "", name).replace("_", " "))
+            style = "-" if np.count_nonzero(np.isfinite(values)) > 2 else ".-"
+            axes.plot(time / size, values, style, label=re.sub(r"^drift | \[.*", "", name).replace("_", " "))
         axes.set(xlabel=f"time [{unit}]", ylabel=title)
         axes.grid(alpha=0.3)
         if len(curves) > 1:
@@ -130,10 +132,11 @@ def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def draw_legend(axes: Axes, columns: int = 2) -> None:
     """A small legend above a panel, clear of the exponent of its axis."""
+    height = axes.get_window_extent().height / axes.get_figure(root=True).dpi
     axes.legend(
         fontsize="x-small",
         loc="lower left",
-        bbox_to_anchor=(-0.12, 1.07),
+        bbox_to_anchor=(-0.12, 1.0 + EXPONENT / height),
         ncols=columns,
         frameon=False,
         borderaxespad=0.0,

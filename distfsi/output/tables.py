@@ -13,7 +13,7 @@ from distfsi.output.panels import LEFT, LOGARITHMIC, TITLE, XLABEL, draw_legend,
 from distfsi.output.progress import format_time
 from distfsi.output.scales import largest, norm_of, scaled
 
-WIDTH, PANEL_HEIGHT, GAP = 10.0, 1.7, 0.55  # inches
+WIDTH, PANEL_HEIGHT, GAP = 10.0, 1.7, 0.65  # inches
 COLUMNS, TIMES = 2, 5
 COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[xyz]{1,2}))?( \[(?P<unit>.*)\])?")
 

@@ -18,7 +18,7 @@ from distfsi.simulation import deal_blocks
 
 PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
 PICTURE_BYTES = 40e6  # of the maps in the summary
-PARTICLE_BYTES = {1: 900.0, 2: 1000.0, 3: 1750.0}  # at the peak within a step, by dimensions
+PARTICLE_BYTES = {1: 900.0, 2: 1060.0, 3: 1280.0}  # at the peak within a step, by dimensions
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
 PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
 SECONDS_TO_LOAD = 0.25  # what a process needs once, whatever it runs
