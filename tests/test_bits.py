@@ -14,6 +14,7 @@ TUBE = (
     "--set", "domain.cells=[40, 40]",
     "--set", "domain.upper=['40 mm', '40 mm']",
     "--set", "solid.bodies.tube.spacing=0.6 mm",
+    "--set", "fluid.riemann=adaptive",  # the flux that looks farthest
     "--set", "time.maximum_steps=60",
     "--set", "output.fields_every=0",
 )  # fmt: skip

@@ -72,9 +72,10 @@ def test_plate_impact(tmp_path):
 FULL_TUBE = ("domain.cells=[64,64]", 'solid.bodies.tube.spacing="1.2 mm"', 'time.end="6 us"')
 
 
-def test_momentum_of_a_tube_with_its_charge_off_centre(tmp_path):
+@pytest.mark.parametrize("riemann", ["hllc", "adaptive"])
+def test_momentum_of_a_tube_with_its_charge_off_centre(tmp_path, riemann):
     """Full tube: momentum of fluid + solid + ledger constant to 1e-12 of the sum of its absolute values."""
-    directory = run_input("steel_tube_full.toml", tmp_path, *FULL_TUBE)
+    directory = run_input("steel_tube_full.toml", tmp_path, *FULL_TUBE, f"fluid.riemann={riemann}")
     history = read_history(directory / "history.csv")
     for name in ("momentum_x", "momentum_y"):
         assert np.abs(history[f"drift {name}"]).max() < 1e-12

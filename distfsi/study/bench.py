@@ -20,6 +20,8 @@ import numpy as np
 from distfsi import __version__
 from distfsi.device.cpu import cache_directory
 from distfsi.mesh.communicator import Communicator
+from distfsi.parts.accounts import Accounts
+from distfsi.parts.accounts import Accounts
 from distfsi.parts.fluid import Fluid
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
@@ -63,6 +65,16 @@ def time_loop(simulation: Simulation, seconds: float) -> tuple[float, float]:
     return first, best
 
 
+def time_history(simulation: Simulation) -> float:
+    """Best time [s] of one row of the history."""
+    accounts, best = Accounts(simulation.fluid, simulation.solid, simulation.coupling), np.inf
+    for _ in range(REPEATS):
+        started = clock.perf_counter()
+        accounts.row(simulation)
+        best = min(best, clock.perf_counter() - started)
+    return best
+
+
 def time_kernel(simulation: Simulation) -> float:
     """Best time [s] of one bare stage kernel on this rank's tiles."""
     fluid, best = simulation.fluid, np.inf
@@ -96,6 +108,7 @@ def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, se
         "cell_stages_per_second": len(simulation.fluid.stages) * cells / step,
         "kernel_cell_stages_per_second": cells / kernel,
         "share_of_kernel": len(simulation.fluid.stages) * kernel / step,
+        "history_row_seconds": time_history(simulation),
         "bytes_per_cell": sum(memory) / cells,
         "first_step_seconds": first,
     }
@@ -123,7 +136,11 @@ def bench_smallest(work: Scene, communicator: Communicator, threads: int | None,
     simulation.step()
     communicator.barrier()
     seconds_to_start = clock.perf_counter() - started
-    return {"start_seconds": seconds_to_start, "seconds_per_step": time_loop(simulation, seconds)[1]}
+    return {
+        "start_seconds": seconds_to_start,
+        "seconds_per_step": time_loop(simulation, seconds)[1],
+        "history_row_seconds": time_history(simulation),
+    }
 
 
 def _forget_kernels() -> None:

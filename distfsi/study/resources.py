@@ -135,8 +135,10 @@ class Resources:
         fixed = bench[f"smallest_{smallest}"]
         work = moving * self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
         files = self.output_times() * (SECONDS_PER_FILE + self.output_bytes() / BYTES_PER_SECOND)
-        start = SECONDS_TO_LOAD + fixed["start_seconds"]
-        return start + self.steps * (fixed["seconds_per_step"] + share * work) + files
+        bubble = bench["shock_bubble_2d"]
+        row = fixed["history_row_seconds"] + share * self.cells * bubble["history_row_seconds"] / bubble["cells"]
+        step = fixed["seconds_per_step"] + share * work + row / self.scene.output.history_every
+        return SECONDS_TO_LOAD + fixed["start_seconds"] + self.steps * step + files
 
     def _pieces(self) -> int:
         """Into how many pieces the work can be cut: tiles and, by the hundred, particles."""
