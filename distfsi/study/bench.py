@@ -28,18 +28,23 @@ from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.study.works import COUPLED, FLUIDS, SMALLEST, SOLIDS
 
 REPEATS = 5
-RIPPLE = 1e-4
+RIPPLE = 1e-4  # relative
+SHEAR_RATE = 10.0  # 1/s
 
 Result = dict[str, float]
 
 
 def start(work: Scene, communicator: Communicator, threads: int | None) -> Simulation:
-    """The work before its first step, with waves everywhere: no part of a fluid is at rest."""
+    """The work before its first step, with waves everywhere, so that no part of a fluid is at rest, and bodies sheared,
+    so that they yield."""
     simulation = Simulation.of(work, communicator, threads)
     if simulation.fluid:
         state, conserved = simulation.fluid.state, simulation.fluid.model.conserved
         ripple = 1.0 + RIPPLE * np.cos(np.arange(np.prod(state.shape[2:]))).reshape(state.shape[2:])
         state[:, :conserved] *= ripple.astype(state.dtype)
+    if simulation.solid:
+        particles = simulation.solid.columns
+        particles["velocity"][:, 0] += SHEAR_RATE * particles["position"][:, -1]
     return simulation
 
 

@@ -15,6 +15,7 @@ from distfsi.scene.description import IdealGas, Scene, StiffenedGas
 from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps
 from distfsi.simulation import deal_blocks
+from distfsi.study.works import SMOOTHING
 
 PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
 PICTURE_BYTES = 40e6  # of the maps in the summary
@@ -162,10 +163,11 @@ class Resources:
         return len(SSP_RK3) / rate
 
     def _seconds_per_particle(self, bench: dict) -> float:
-        """Of a time step; in a fluid with what the coupling takes besides."""
+        """Of a time step, by the number of neighbours; in a fluid with what the coupling takes besides."""
         if not self.particles:
             return 0.0
-        alone = 1.0 / bench[f"copper_block_{self.dimensions}d"]["particle_steps_per_second"]
+        neighbours = (self.scene.solid.smoothing / SMOOTHING) ** self.dimensions
+        alone = neighbours / bench[f"copper_block_{self.dimensions}d"]["particle_steps_per_second"]
         if not self.cells:
             return alone
         D = max(self.dimensions, 2)
@@ -174,4 +176,5 @@ class Resources:
         stages *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"]
         stages /= bench["shock_bubble_2d"]["cell_stages_per_second"]
         fluid = len(SSP_RK3) * both["cells"] / stages / both["particles"]
-        return max(1.0 / both["particle_steps_per_second"] - fluid, alone)
+        solid = 1.0 / bench[f"copper_block_{D}d"]["particle_steps_per_second"]
+        return alone + max(1.0 / both["particle_steps_per_second"] - fluid - solid, 0.0)

@@ -13,6 +13,7 @@ AIR, HELIUM, WATER = scene.IdealGas(1.4), scene.IdealGas(1.67), scene.StiffenedG
 TNT = scene.Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
 COPPER = scene.MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
 COPPER_STRENGTH = scene.JohnsonCook(46e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 293.0, 1356.0, 383.0, 0.9)
+SMOOTHING = 1.3
 BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressure
 
 
@@ -56,7 +57,7 @@ def _cube(lower: tuple[float, ...], side: float) -> scene.Solid:
     shape = scene.Box(lower, tuple(a + side for a in lower))
     velocity = (10.0,) + (0.0,) * (D - 1)
     return scene.Solid(
-        (scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None),), 1.3, 1.0, 2.0
+        (scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None),), SMOOTHING, 1.0, 2.0
     )
 
 
