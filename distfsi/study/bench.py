@@ -21,7 +21,6 @@ from distfsi import __version__
 from distfsi.device.cpu import cache_directory
 from distfsi.mesh.communicator import Communicator
 from distfsi.parts.accounts import Accounts
-from distfsi.parts.accounts import Accounts
 from distfsi.parts.fluid import Fluid
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
@@ -35,14 +34,14 @@ Result = dict[str, float]
 
 
 def start(work: Scene, communicator: Communicator, threads: int | None) -> Simulation:
-    """The work before its first step, with waves everywhere, so that no part of a fluid is at rest, and bodies sheared,
-    so that they yield."""
+    """The work before its first step, with waves everywhere, so that no part of a fluid is at rest, and bodies sheared
+    where there are two dimensions, so that they yield."""
     simulation = Simulation.of(work, communicator, threads)
     if simulation.fluid:
         state, conserved = simulation.fluid.state, simulation.fluid.model.conserved
         ripple = 1.0 + RIPPLE * np.cos(np.arange(np.prod(state.shape[2:]))).reshape(state.shape[2:])
         state[:, :conserved] *= ripple.astype(state.dtype)
-    if simulation.solid:
+    if simulation.solid and work.domain.dimensions > 1:
         particles = simulation.solid.columns
         particles["velocity"][:, 0] += SHEAR_RATE * particles["position"][:, -1]
     return simulation
