@@ -1,5 +1,6 @@
 """Tiles at rest are not computed, and the result is the same to the bit."""
 
+import functools
 import re
 
 import numpy as np
@@ -16,32 +17,36 @@ def never_uniform(U, u, su, sz, sy, n, m, l):
     return False
 
 
-@pytest.fixture(scope="module")
-def rested():
-    """Every scene as users run it."""
-    return {name: follow(name) for name in [*SCENES, "tube"]}
+LONG = ("falling", "space", "tube")  # kernels of their own, twice: they take minutes to compile
 
 
-@pytest.fixture(scope="module")
-def computed():
-    """Every scene with all tiles computed."""
+@functools.cache
+def rested(name):
+    """A scene as users run it."""
+    return follow(name)
+
+
+@functools.cache
+def computed(name):
+    """A scene with all tiles computed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "is_uniform", never_uniform)
-        return {name: follow(name) for name in [*SCENES, "tube"]}
+        return follow(name)
 
 
-def test_without_the_look_at_the_values_nothing_rests(computed):
-    """So that the tests below do compare."""
-    assert all(share == 0.0 for _, share in computed.values())
+def scenes():
+    """The names of all scenes, the long ones for the full tier."""
+    return [pytest.param(name, marks=pytest.mark.full if name in LONG else ()) for name in [*SCENES, "tube"]]
 
 
-@pytest.mark.parametrize("name", [*SCENES, "tube"])
-def test_rest_changes_no_bit(rested, computed, name):
+@pytest.mark.parametrize("name", scenes())
+def test_rest_changes_no_bit(name):
     """Cells, time steps and the whole row of the history, in which each wall has its impulse."""
-    found, share = rested[name]
-    for what, values in computed[name][0].items():
+    (found, share), (expected, none) = rested(name), computed(name)
+    assert none == 0.0  # without the look at the values nothing rests, so this does compare
+    for what, values in expected.items():
         np.testing.assert_array_equal(found[what], values, err_msg=what)
-    assert digest(found) == digest(computed[name][0])
+    assert digest(found) == digest(expected)
     assert share == 0.0 if name == "falling" else share > 0.2
 
 
@@ -87,19 +92,25 @@ def test_blocks_with_covered_cells_are_looked_at():
 
 
 @pytest.mark.parametrize(
-    ("ranks", "names"), [(2, ("corner", "space")), (4, ("corner", "periodic", "inflow", "interface", "tube"))]
+    ("ranks", "names"),
+    [
+        (2, ("corner",)),
+        pytest.param(2, ("space",), marks=pytest.mark.full),
+        (4, ("corner", "periodic", "inflow", "interface")),
+        pytest.param(4, ("tube",), marks=pytest.mark.full),
+    ],
 )
-def test_rest_on_several_ranks(rested, computed, mpiexec, ranks, names):
+def test_rest_on_several_ranks(mpiexec, ranks, names):
     """The same bits, and as much at rest as on one rank."""
     printed = dict(
         re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, ROOT / "tests/mpi_rest.py", *names), re.MULTILINE)
     )
-    assert printed == {name: f"{digest(computed[name][0])} {rested[name][1]:.6f}" for name in names}
+    assert printed == {name: f"{digest(computed(name)[0])} {rested(name)[1]:.6f}" for name in names}
 
 
-def test_cut_changes_no_bit_of_the_cells(rested):
+def test_cut_changes_no_bit_of_the_cells():
     """Whatever the blocks and tiles."""
-    found = [rested[name][0] for name in ("corner", "large blocks", "thin tiles")]
+    found = [rested(name)[0] for name in ("corner", "large blocks", "thin tiles")]
     for other in found[1:]:
         for what in ("cells", "time steps"):
             np.testing.assert_array_equal(other[what], found[0][what], err_msg=what)
