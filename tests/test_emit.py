@@ -577,8 +577,8 @@ def test_the_module_is_named_by_its_text():
 
 def test_the_text_names_the_source():
     text = text_of(material, {"GAMMA": 1.4})
-    for function in (material, scaled):
-        assert f"# {__name__}.py, line {function.__code__.co_firstlineno}\n@formula\ndef {function.__name__}(" in text
+    for function, kind in ((material, "driver"), (scaled, "formula")):  # the first is what Python calls
+        assert f"# {__name__}.py, line {function.__code__.co_firstlineno}\n@{kind}\ndef {function.__name__}(" in text
 
 
 def test_two_scenes_live_side_by_side():

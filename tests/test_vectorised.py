@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
+from numba import typeof
 
 from distfsi.device import emit, runtime
 from distfsi.kernels import fluid, peaks
@@ -35,7 +36,7 @@ def module_text(row, scene):
 
 
 def machine_code(row, text, real):
-    """What the module's row becomes when called with arrays (upper-case names), reals and integers."""
+    """What the module's row becomes for arrays (upper-case names), reals and integers."""
     module = {}
     exec(text, module)
     arguments = [
@@ -46,7 +47,7 @@ def machine_code(row, text, real):
         else 0
         for name in inspect.signature(row).parameters
     ]
-    module[row.__name__](*arguments)  # of no cells
+    module[row.__name__].compile(tuple(map(typeof, arguments)))
     return "\n".join(module[row.__name__].inspect_asm().values())
 
 

@@ -92,13 +92,14 @@ class _TypedLiterals(ast.NodeTransformer):
 def numba_text(
     driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str, runtime_version: str
 ) -> str:
-    """The module text for one driver; `real` is "float64" or "float32"."""
+    """The module text for one driver, or for a formula as if it were one; `real` is "float64" or "float32"."""
     emission = Emission(constants, bindings)
-    emission.add(driver, {})
+    root = emission.add(driver, {})
     literals, parts = _TypedLiterals(), []
     for source, tree in _callees_first(emission.functions):
         text = ast.unparse(ast.fix_missing_locations(literals.visit(tree)))
-        parts.append(f"# {source.place}\n@{source.kind}\n{text}")
+        kind = "driver" if tree.name == root and source.kind == "formula" else source.kind
+        parts.append(f"# {source.place}\n@{kind}\n{text}")
     values = [f"{name} = real({_number(value)})" for value, name in literals.names.items()]
     head = [
         f"# distfsi kernel module, runtime {runtime_version}",

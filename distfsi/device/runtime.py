@@ -24,9 +24,11 @@ _OPTIONS = cpu_target.options
 if not hasattr(_OPTIONS, "noalias"):
     _OPTIONS.noalias = TargetOptions.Mapping("noalias")
 
-formula = njit(forceinline=True, error_model="numpy")
-helper = njit(forceinline=True, error_model="numpy")
-row = njit(error_model="numpy", noalias=True)
+# Only drivers are called from Python; without wrappers the others compile a fifth faster.
+_INSIDE = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+formula = njit(forceinline=True, **_INSIDE)
+helper = njit(forceinline=True, **_INSIDE)
+row = njit(noalias=True, **_INSIDE)
 driver = njit(error_model="numpy", nogil=True, cache=True)
 
 
