@@ -19,7 +19,7 @@ from distfsi.errors import Diverged, Stopped
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.model import fluid_model
-from distfsi.output.journal import Journal
+from distfsi.output.journal import Journal, set_aside
 from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
 from distfsi.output.records import Records
@@ -236,6 +236,8 @@ def run(scene: Scene, communicator: Communicator, threads: int | None = None, re
     files = storage(output.hdf5, communicator)
     origin = find_restart(restart, directory, scene, communicator)
     prepare_directory(directory, communicator)
+    if restart is None:
+        set_aside(directory, communicator)
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)

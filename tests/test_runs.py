@@ -83,3 +83,20 @@ def test_momentum_of_a_tube_with_its_charge_off_centre(tmp_path, riemann):
     assert np.abs(history["drift energy"]).max() < 1e-12
     made = sum(history[name][-1] for name in history if name.startswith("ledger") and "energy" in name)
     assert abs(made) < 0.05 * history["fluid energy [J]"][0]
+
+
+def test_a_second_run_keeps_the_results_of_the_first(tmp_path, capfd):
+    """They are moved aside, file by file; what else lies in the directory stays."""
+    (tmp_path / "notes.txt").write_text("mine")
+    for ends in (1, 2, 3):
+        run_input("sod.toml", tmp_path, "domain.cells=[16]", f"time.maximum_steps={ends}")
+    assert capfd.readouterr().out.count("the results of an earlier run are now in") == 2
+    now, first, second = (
+        {p.name for p in f.iterdir()} for f in (tmp_path, tmp_path / "earlier-1", tmp_path / "earlier-2")
+    )
+    assert first == second == now - {"notes.txt", "earlier-1", "earlier-2"}
+    steps = [
+        read_history(folder / "history.csv")["step"][-1]
+        for folder in (tmp_path / "earlier-1", tmp_path / "earlier-2", tmp_path)
+    ]
+    assert steps == [1, 2, 3]

@@ -11,10 +11,31 @@ from typing import Any
 from distfsi import __version__
 from distfsi.errors import DistfsiError, Diverged, Stopped
 from distfsi.output.interfaces import Communicator
-from distfsi.output.storage import replace
+from distfsi.output.storage import on_root, replace
 
 NAME = "run.json"
+RESULTS = (NAME, "*.csv", "*.vtkhdf", "*.vtkhdf.series", "restart-*.h5", "summary.png")
 ENDINGS = {Stopped: "stopped", Diverged: "diverged"}
+
+
+def set_aside(directory: Path, communicator: Communicator) -> None:
+    """Collective. Move the results of an earlier run in `directory`, if there are any, to `earlier-N` in it.
+
+    Raises OutputError on all ranks.
+    """
+    on_root(communicator, directory, lambda: _move_results(directory))
+
+
+def _move_results(directory: Path) -> None:
+    if not (directory / NAME).exists():
+        return
+    number = 1 + max((int(path.name[8:]) for path in directory.glob("earlier-*") if path.name[8:].isdigit()), default=0)
+    earlier = directory / f"earlier-{number}"
+    earlier.mkdir()
+    for pattern in RESULTS:
+        for path in directory.glob(pattern):
+            path.rename(earlier / path.name)
+    print(f"the results of an earlier run are now in {earlier}", flush=True)
 
 
 class Journal:
