@@ -1,4 +1,4 @@
-"""Loops of the solid: neighbour search, forces, and the update of the particles.
+"""Loops of the solid: neighbour search and forces; those of the material point are in material.py.
 
 `position` (count, DIMENSIONS) and `state` (count, columns below) hold a rank's own particles first, then its ghosts and
 images. All sums gather: the neighbours of a particle are visited in one order on any number of ranks and threads.
@@ -7,6 +7,7 @@ images. All sums gather: the neighbours of a particle are visited in one order o
 from math import floor
 
 from distfsi.device.markers import driver, helper
+from distfsi.kernels.material import matrix_of
 from distfsi.physics.pair import (
     approach_speed,
     corrected_stress,
@@ -18,15 +19,12 @@ from distfsi.physics.pair import (
     stable_time,
     viscosity,
 )
-from distfsi.physics.smoothing import dilated, smoothing_slope
-from distfsi.physics.solid_eos import bulk_modulus, solid_pressure, solid_sound_speed
-from distfsi.physics.strength import plastic_heating, plastic_increment, trial_deviator, von_mises, yield_stress
+from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
-from distfsi.physics.tensors import dot, product, trace
+from distfsi.physics.tensors import dot, product
 
 MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
-EOS_CONSTANTS, STRENGTH_CONSTANTS = 9, 11  # columns of the material tables
 
 # ---- neighbour search -----------------------------------------------------------------------------------------------
 
@@ -99,12 +97,6 @@ def find_neighbours(begin, end, position, state, cell, start, order, rows, neigh
 def difference(A, column, i, j):
     """Vector of A[i] minus that of A[j]."""
     return tuple(A[i, column + d] - A[j, column + d] for d in static_range(DIMENSIONS))
-
-
-@helper
-def matrix_of(A, i):
-    """Matrix whose rows lie one after the other in A[i]."""
-    return tuple(tuple(A[i, a * DIMENSIONS + b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
 
 
 @helper
@@ -197,34 +189,3 @@ def heat(begin, end, position, state, neighbours, neighbour_count, dt, stress, c
             total = plus(total, pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY]))
         energy[i] += dt * power
         store_matrix(gradient, i, mid_step(product(total, matrix_of(correction, i)), dt))
-
-
-@driver
-def deform(
-    begin, end, dt, gradient, body, eos, strength, energy, density, h, deviator, strain, temperature, pressure, sound
-):
-    """Advance density, smoothing length, stress, plastic strain and temperature by `dt` of the velocity gradient.
-
-    `eos` and `strength` hold one row of constants per body.
-    """
-    for i in range(begin, end):
-        rates = matrix_of(gradient, i)
-        law = tuple(eos[body[i], k] for k in static_range(EOS_CONSTANTS))
-        metal = tuple(strength[body[i], k] for k in static_range(STRENGTH_CONSTANTS))
-        density[i], h[i] = dilated(density[i], h[i], trace(rates), dt)
-
-        stress = trial_deviator(tuple(deviator[i, c] for c in static_range(COMPONENTS)), rates, metal[0], dt)
-        trial = von_mises(stress)
-        scale = 1.0
-        if trial > yield_stress(strain[i], 0.0, temperature[i], metal):
-            increment = plastic_increment(trial, strain[i], temperature[i], dt, metal)
-            flow = trial - 3.0 * metal[0] * increment
-            scale = flow / trial
-            strain[i] += increment
-            temperature[i] += plastic_heating(increment, flow, density[i], metal)
-        for c in static_range(COMPONENTS):
-            deviator[i, c] = scale * stress[c]
-
-        pressure[i] = solid_pressure(density[i], energy[i], law)
-        bulk = bulk_modulus(density[i], energy[i], pressure[i], law)
-        sound[i] = solid_sound_speed(density[i], bulk, metal[0], law)

@@ -14,6 +14,7 @@ import numpy as np
 from distfsi.device import cpu
 from distfsi.device.emit import plain
 from distfsi.errors import Diverged
+from distfsi.kernels import material
 from distfsi.kernels import solid as kernels
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
@@ -33,7 +34,7 @@ DRIVERS = (
     kernels.correct,
     kernels.accelerate,
     kernels.heat,
-    kernels.deform,
+    material.deform,
 )
 SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 ROOM_COLUMN = 7  # of the strength table
