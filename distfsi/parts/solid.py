@@ -19,7 +19,7 @@ from distfsi.kernels import solid as kernels
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
-from distfsi.parts.materials import eos_table, strength_table
+from distfsi.parts.materials import Materials
 from distfsi.parts.neighbours import NeighbourSearch
 from distfsi.physics.strength import von_mises
 from distfsi.scene.description import Scene
@@ -37,7 +37,6 @@ DRIVERS = (
     material.deform,
 )
 SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
-ROOM_COLUMN = 7  # of the strength table
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
@@ -45,8 +44,8 @@ class Solid:
     """All particles of this rank. A step is prepare(), time_step(), advance(dt, impulse), migrate().
 
     columns  this rank's particles, sorted by (block, id): id, body, fixed (n,), position [m], velocity [m/s] (n, D),
-             mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), deviator (n, D(D+1)/2) [Pa],
-             plastic_strain, temperature [K], pressure [Pa], sound_speed [m/s] (n,).
+             mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the materials remember
+             (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s], damage (n,) …
              Velocities belong to half a step before the positions.
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
@@ -56,7 +55,7 @@ class Solid:
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = scene.domain.dimensions
         self.gravity = np.array(scene.gravity)
-        self.eos, self.strength = eos_table(scene.solid.bodies), strength_table(scene.solid.bodies)
+        self.materials = Materials(scene.solid, self.dimensions)
         self.exchange = ParticleExchange(blocks)
         axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
@@ -67,7 +66,7 @@ class Solid:
             "COMPONENTS": self._components,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
-        }
+        } | self.materials.constants
         self.kernels = cpu.build(DRIVERS, constants)
         self._von_mises = plain(von_mises, constants)
         self.neighbours = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
@@ -88,10 +87,8 @@ class Solid:
         mine = mine[np.argsort(block[mine], kind="stable")]
         c = {name: column[mine] for name, column in columns.items()}
         n = len(mine)
-        c |= {name: np.zeros(n) for name in ("energy", "plastic_strain", "pressure", "sound_speed")}
-        c["deviator"] = np.zeros((n, self._components))
-        c["temperature"] = self.strength[c["body"], ROOM_COLUMN]
-        self.columns = c
+        c["energy"] = np.zeros(n)
+        self.columns = c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"])
         self._find_blocks()
         self._deform(0.0, np.zeros((n, self.dimensions**2)))
 
@@ -175,9 +172,8 @@ class Solid:
 
     def _deform(self, dt: float, gradient: np.ndarray) -> None:
         c = self.columns
-        names = ("energy", "density", "h", "deviator", "plastic_strain", "temperature", "pressure", "sound_speed")
-        arrays = [c[name] for name in names]
-        self._run(self.kernels.deform, dt, gradient, c["body"], self.eos, self.strength, *arrays)
+        state = self.materials.state(c)
+        self._run(self.kernels.deform, dt, gradient, c["body"], *self.materials.tables, *state)
 
     def _run(self, kernel: Callable, *arguments) -> None:
         self.team.run(kernel, len(self.columns["id"]), *arguments)
@@ -269,7 +265,7 @@ class Solid:
         c, D = self.columns, self.dimensions
         c = c if chosen is None else {name: column[chosen] for name, column in c.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
-        names = ("density", "pressure", "energy", "plastic_strain", "temperature", "id", "body")
+        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant
 

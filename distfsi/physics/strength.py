@@ -1,54 +1,40 @@
-"""Strength of a solid: Jaumann rate, radial return, Johnson-Cook yield stress (paper, A.2-A.7).
+"""Strength of a solid: Hooke's law, radial return, Johnson-Cook yield stress (paper, A.2-A.7).
 
 The deviatoric stress is the tuple of its COMPONENTS (tensors.py); the normal stresses out of the plane share what makes
 its trace vanish. `gradient` is the velocity gradient by rows, gradient[a][b] = dv_a/dx_b [1/s].
 A material's `strength` is the tuple (shear_modulus, A, B, n, C, m, reference_rate, room_temperature, melt_temperature,
-heat_capacity, taylor_quinney): no strength is shear_modulus = A = 0, elastic A = inf, perfectly plastic B = C = 0.
+heat_capacity, taylor_quinney): no strength is shear_modulus = A = 0, elastic A = inf, perfectly plastic B = C = 0,
+linear hardening n = 1, C = 0.
 """
 
 from math import exp, log, pow, sqrt
 
+from distfsi.physics.rotation import rotation
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
 from distfsi.physics.tensors import components, product, rows, trace, transposed
 
 
-def half_rotation(gradient, dt):
-    """Antisymmetric matrix whose Cayley transform turns by the spin times `dt`: tan(t/2) = t/2 (1 + t^2/12 + ...)."""
-    half = 0.25 * dt
-    spin = tuple(
-        tuple(half * (gradient[a][b] - gradient[b][a]) for b in static_range(DIMENSIONS))
-        for a in static_range(DIMENSIONS)
-    )
-    tangent2 = 0.5 * sum(
-        sum(spin[a][b] * spin[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
-    )
-    longer = 1.0 + tangent2 / 3.0
-    return tuple(tuple(longer * spin[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
-
-
-def rotation(gradient, dt):
-    """Orthogonal matrix that turns by the spin times `dt` (Hughes-Winget, of fourth order in the angle)."""
-    half = half_rotation(gradient, dt)
-    square = product(half, half)
-    factor = 2.0 / (1.0 - 0.5 * trace(square))
-    return tuple(
-        tuple((1.0 if a == b else 0.0) + factor * (half[a][b] + square[a][b]) for b in static_range(DIMENSIONS))
-        for a in static_range(DIMENSIONS)
-    )
-
-
-def trial_deviator(deviator, gradient, shear_modulus, dt):
-    """Elastic trial stress [Pa] after `dt` (A.3): turned with the material, then strained by Hooke's law."""
-    turn = rotation(gradient, dt)
-    turned = components(product(product(turn, rows(deviator)), transposed(turn)))
+def stretching(gradient):
+    """Deviator of the rate of strain [1/s], by components."""
     mean = trace(gradient) / 3.0
-    stretching = tuple(
-        tuple(0.5 * (gradient[a][b] + gradient[b][a]) - (mean if a == b else 0.0) for b in static_range(DIMENSIONS))
-        for a in static_range(DIMENSIONS)
+    return components(
+        tuple(
+            tuple(0.5 * (gradient[a][b] + gradient[b][a]) - (mean if a == b else 0.0) for b in static_range(DIMENSIONS))
+            for a in static_range(DIMENSIONS)
+        )
     )
-    strain = components(stretching)
-    return tuple(turned[c] + 2.0 * shear_modulus * dt * strain[c] for c in static_range(COMPONENTS))
+
+
+def trial_deviator(deviator, gradient, spin, shear_modulus, dt):
+    """Elastic trial stress [Pa] after `dt` (A.3): half of the strain (Hooke's law) comes before the stress is turned
+    with the `spin` of its axes, half after."""
+    strain = stretching(gradient)
+    half = tuple(shear_modulus * dt * strain[c] for c in static_range(COMPONENTS))
+    turn = rotation(spin, dt)
+    strained = tuple(deviator[c] + half[c] for c in static_range(COMPONENTS))
+    turned = components(product(product(turn, rows(strained)), transposed(turn)))
+    return tuple(turned[c] + half[c] for c in static_range(COMPONENTS))
 
 
 def von_mises(deviator):
@@ -66,10 +52,14 @@ def rate_factor(rate, strength):
     return 1.0 + strength[4] * log(max(rate / strength[6], 1.0))
 
 
+def homologous_temperature(temperature, strength):
+    """T* (A.7), 0 at room temperature and 1 when molten, held in between; `temperature` [K]."""
+    return min(max((temperature - strength[7]) / (strength[8] - strength[7]), 0.0), 1.0)
+
+
 def softening(temperature, strength):
-    """1 - T*^m with T* held within 0 and 1 (A.6, A.7); `temperature` [K]."""
-    shear_modulus, A, B, n, C, m, reference_rate, room, melt, heat_capacity, taylor_quinney = strength
-    return 1.0 - pow(min(max((temperature - room) / (melt - room), 0.0), 1.0), m)
+    """1 - T*^m (A.6)."""
+    return 1.0 - pow(homologous_temperature(temperature, strength), strength[5])
 
 
 def yield_stress(plastic_strain, rate, temperature, strength):

@@ -54,3 +54,6 @@ sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m
 COMPONENTS = Symbol("stored components of a symmetric tensor: DIMENSIONS (DIMENSIONS + 1)/2")
 VISCOSITY_ALPHA = Symbol("Monaghan viscosity, linear part")
 VISCOSITY_BETA = Symbol("Monaghan viscosity, quadratic part")
+POLAR_ROTATION = Symbol("whether stresses turn with the rotation of the polar decomposition; else with the vorticity")
+FAILS = Symbol("whether any material can fail")
+CONCRETE = Symbol("whether any material is concrete")

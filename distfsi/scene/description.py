@@ -11,6 +11,7 @@ from typing import Literal
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Scheme = Literal["rk2", "rk3"]
+ObjectiveRate = Literal["jaumann", "green_naghdi"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
 
@@ -148,13 +149,30 @@ class LinearEos:
 
 
 @dataclass(frozen=True)
+class Compaction:
+    """Concrete's pressure: elastic to the crush point, pores closing up to the lock pressure, then dense with
+    p = K1 x + K2 x^2 + K3 x^3, x = (mu - lock_strain)/(1 + lock_strain) (Holmquist, Johnson & Cook 1993)."""
+
+    crush_pressure: float
+    crush_strain: float
+    lock_pressure: float
+    lock_strain: float
+    K1: float
+    K2: float
+    K3: float
+
+
+SolidEos = MieGrueneisen | LinearEos | Compaction
+
+
+@dataclass(frozen=True)
 class NoStrength:
     """A fluid-like solid: no deviatoric stress."""
 
 
 @dataclass(frozen=True)
 class Elastic:
-    """Hooke's law with the Jaumann rate (A.3)."""
+    """Hooke's law (A.3)."""
 
     shear_modulus: float
 
@@ -165,6 +183,15 @@ class PerfectlyPlastic:
 
     shear_modulus: float
     yield_stress: float
+
+
+@dataclass(frozen=True)
+class LinearHardening:
+    """Yield stress yield_stress + hardening_modulus * plastic strain."""
+
+    shear_modulus: float
+    yield_stress: float
+    hardening_modulus: float
 
 
 @dataclass(frozen=True)
@@ -184,7 +211,64 @@ class JohnsonCook:
     taylor_quinney: float
 
 
-Strength = NoStrength | Elastic | PerfectlyPlastic | JohnsonCook
+@dataclass(frozen=True)
+class Concrete:
+    """Holmquist, Johnson & Cook 1993 (A.8-A.11 corrected): yield at compressive_strength times
+    (A (1 - wear) + B p*^N)(1 + C ln(rate/reference_rate)) <= cap; wear by plastic and compacted strain over
+    max(D1 (p* + T*)^D2, least_failure_strain)."""
+
+    shear_modulus: float
+    compressive_strength: float
+    tensile_strength: float
+    A: float
+    B: float
+    N: float
+    C: float
+    cap: float
+    D1: float
+    D2: float
+    least_failure_strain: float
+    reference_rate: float
+
+
+Strength = NoStrength | Elastic | PerfectlyPlastic | LinearHardening | JohnsonCook | Concrete
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Weibull's scatter of the failure strain or stress: a piece of `size` [m] has the given one on average."""
+
+    modulus: float
+    size: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class JohnsonCookFailure:
+    """Fracture strain (D1 + D2 exp(D3 eta))(1 + D4 ln(rate/reference_rate))(1 + D5 T*), and spall at a principal
+    stress; a crack takes fracture_energy [J/m2]."""
+
+    D1: float
+    D2: float
+    D3: float
+    D4: float
+    D5: float
+    reference_rate: float
+    spall_strength: float
+    fracture_energy: float
+    scatter: Scatter | None
+
+
+@dataclass(frozen=True)
+class PrincipalStress:
+    """A crack opens where the largest principal stress reaches tensile_strength; it takes fracture_energy [J/m2]."""
+
+    tensile_strength: float
+    fracture_energy: float
+    scatter: Scatter | None
+
+
+Failure = JohnsonCookFailure | PrincipalStress
 
 
 @dataclass(frozen=True)
@@ -196,9 +280,10 @@ class Body:
     spacing: float
     density: float
     velocity: tuple[float, ...]
-    eos: MieGrueneisen | LinearEos
+    eos: SolidEos
     strength: Strength
     fixed: Shape | None
+    failure: Failure | None = None
 
 
 @dataclass(frozen=True)
@@ -209,6 +294,7 @@ class Solid:
     smoothing: float
     viscosity_alpha: float
     viscosity_beta: float
+    objective_rate: ObjectiveRate = "jaumann"
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------
