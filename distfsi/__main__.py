@@ -16,7 +16,14 @@ from distfsi.errors import DistfsiError, InputError
 if TYPE_CHECKING:
     from distfsi.mesh.communicator import Communicator
 
-STUDIES = ("steel_tube", "undex_2d", "shock_bubble", "shock_bubble_speed")  # modules of distfsi.study
+STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
+    "steel_tube",
+    "undex_2d",
+    "shock_bubble",
+    "shock_bubble_speed",
+    "frontier fluid",
+    "stability fluid",
+)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -46,7 +53,8 @@ def parser() -> argparse.ArgumentParser:
     bench.add_argument("--threads", type=int, help="threads per rank")
     bench.add_argument("--only", metavar="PART", help="only benchmarks whose name holds PART")
     study = commands.add_parser("study", help="compare with reference answers")
-    study.add_argument("name", choices=STUDIES, help="which study: " + ", ".join(STUDIES))
+    study.add_argument("name", nargs="+", help="which study: " + ", ".join(STUDIES))
+    study.add_argument("--quick", action="store_true", help="a small size that only shows that the study works")
     _add_overrides(study)
     return main
 
@@ -157,10 +165,16 @@ def bench(arguments: argparse.Namespace) -> None:
 
 def study(arguments: argparse.Namespace) -> None:
     """Compare with reference answers."""
-    module = import_module(f"distfsi.study.{arguments.name}")
+    name = " ".join(arguments.name)
+    if name not in STUDIES:
+        raise InputError([f"study {name}: no such study; expected one of {', '.join(STUDIES)}"])
+    module = import_module(f"distfsi.study.{name.replace(' ', '_')}")
+    if arguments.quick and not hasattr(module, "quick"):
+        raise InputError([f"study {name}: has no quick size"])
+    compare = module.quick if arguments.quick else module.main
     communicator = _start_ranks()
     with _telling_once(communicator):
-        module.main(communicator, arguments.set)
+        compare(communicator, arguments.set)
 
 
 COMMANDS = {

@@ -189,3 +189,8 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     draw_charts(DIRECTORY / "tracks.png", [tracks_chart(gas, tracks) for gas, tracks in runs.items()], columns=2)
     print(table({gas: velocities(tracks, scenes[gas]) for gas, tracks in runs.items()}))
     print(f"{NOTE}\ntracks and pictures in {DIRECTORY}", flush=True)
+
+
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """The same on fewer cells."""
+    main(communicator, ["domain.cells=[325,89]", "time.end=95", *overrides])
