@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.device.cpu import Team
 from distfsi.errors import Diverged, Stopped
+from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.model import fluid_model
@@ -35,7 +36,8 @@ from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 
-COST_OF_PARTICLE = 30.0  # in cells, for dealing blocks to ranks
+COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
+STEPS_BETWEEN_DEALS = 100
 
 TimeStep = Callable[[], float]
 
@@ -99,23 +101,30 @@ class Simulation:
     request: Request = Request.NOTHING
 
     @classmethod
-    def of(cls, scene: Scene, communicator: Communicator, threads: int | None = None) -> Simulation:
-        """Build the parts the scene needs, and no others."""
-        blocks = deal_blocks(scene, communicator)
+    def of(
+        cls, scene: Scene, communicator: Communicator, threads: int | None = None, costs: np.ndarray | None = None
+    ) -> Simulation:
+        """Build the parts the scene needs, and no others; `costs`: those of the blocks where they are known."""
+        blocks = deal_blocks(scene, communicator, costs)
         team = Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, team) if scene.fluid else None
-        solid = Solid(scene, blocks, communicator, team) if scene.solid else None
-        coupling = Coupling(scene, model, fluid, solid, blocks, team) if fluid and solid else None
+        fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
+        solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
+        coupling = Coupling(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling)
         if scene.output.peaks:
             simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
         simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
         return simulation
 
+    @property
+    def parts(self) -> list[Fluid | Solid | Coupling]:
+        """Those that the scene needs."""
+        return [part for part in (self.fluid, self.solid, self.coupling) if part is not None]
+
     def step(self) -> None:
         """Advance everything by one step."""
-        parts = [part for part in (self.fluid, self.solid, self.coupling) if part is not None]
+        parts = self.parts
         step = coupled_step if self.coupling else fluid_step if self.fluid else solid_step
         try:
             self.dt = step(*parts, self.time_step)
@@ -202,12 +211,12 @@ class Simulation:
         return cells, self.solid.outputs() if self.solid else None
 
 
-def deal_blocks(scene: Scene, communicator: Communicator) -> Blocks:
-    """The blocks of the scene's domain, dealt to ranks by cells and particles."""
+def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
+    """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
     grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries)
-    blocks = Blocks(grid, scene.performance.block_cells, communicator)
-    if scene.solid is None:
+    blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
+    if scene.solid is None or costs is not None:
         return blocks
     cells = np.minimum(blocks.block_cells, np.array(grid.cells) - blocks.coordinates * blocks.block_cells)
     costs = cells.prod(axis=1).astype(float) if scene.fluid else np.ones(blocks.count)
@@ -241,18 +250,25 @@ def run(scene: Scene, communicator: Communicator, threads: int | None = None, re
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)
+    costs = None
     with requests, closing(progress), threadpool_limits(1), journal:
-        simulation = Simulation.of(scene, communicator, threads)
-        simulation.asked = requests.strongest
-        accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
-        records = Records(simulation, accounts, files, origin)
-        kept = simulation.kept() | {"accounts": accounts, "records": records}
-        if origin:
-            origin.restore(kept, simulation.blocks, communicator)
-        else:
-            simulation.watch()
-            records.write()
-        advance(simulation, records, kept, requests, progress)
+        while True:
+            simulation = Simulation.of(scene, communicator, threads, costs)
+            simulation.asked = requests.strongest
+            accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
+            records = Records(simulation, accounts, files, origin)
+            kept = simulation.kept() | {"accounts": accounts, "records": records}
+            if origin:
+                origin.restore(kept, simulation.blocks, communicator)
+            else:
+                simulation.watch()
+                records.write()
+            costs = advance(simulation, records, kept, requests, progress)
+            if costs is None:
+                break
+            snapshots = {name: part.snapshot() for name, part in kept.items()}
+            origin = Handover(simulation.time, simulation.steps, records.restart, snapshots)
+            del simulation, accounts, records, kept, snapshots  # before those of the new owners are built
     done = (
         f"done: t = {simulation.time:.6g} s after {simulation.steps} steps in {clock.perf_counter() - started:.1f} s."
     )
@@ -265,8 +281,14 @@ def run(scene: Scene, communicator: Communicator, threads: int | None = None, re
     return simulation
 
 
-def advance(simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress) -> None:
-    """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped."""
+def advance(
+    simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress
+) -> np.ndarray | None:
+    """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped.
+
+    None at the end of the run; before it the costs (count,) of the blocks, if they should change hands.
+    """
+    balance = Balance(simulation.parts, simulation.blocks)
     while not simulation.done:
         try:
             simulation.step()
@@ -286,3 +308,9 @@ def advance(simulation: Simulation, records: Records, kept: dict, requests: Requ
                 when = f"at t = {simulation.time:.6g} s after {simulation.steps} steps"
                 remedy = "the same command with --restart auto goes on"
                 raise Stopped(f"stopped {when} by {requests.words(simulation.request)}, state in {path}; {remedy}")
+        if simulation.steps % STEPS_BETWEEN_DEALS == 0 and simulation.communicator.size > 1:
+            costs = balance.watch(simulation.scene.performance.imbalance)
+            records.write_balance(balance.imbalance, changes_hands=costs is not None)
+            if costs is not None:
+                return costs
+    return None

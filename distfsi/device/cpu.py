@@ -7,8 +7,10 @@ import importlib.util
 import os
 import sys
 import threading
+import time as clock
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -86,16 +88,30 @@ class _Compiled:
 
 
 class Team:
-    """Threads of one rank that share the items of a driver call."""
+    """Threads of one rank that share the items of a driver call.
+
+    seconds: how long the calls have taken so far
+    """
 
     CHUNKS_PER_THREAD = 4
 
     def __init__(self, threads: int):
-        self.threads = max(1, threads)
+        self.threads, self.seconds = max(1, threads), 0.0
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    def with_own_clock(self) -> Team:
+        """The same threads, whose seconds are counted apart."""
+        team = copy(self)
+        team.seconds = 0.0
+        return team
 
     def run(self, function: Callable, count: int, *arguments) -> None:
         """Call `function(begin, end, *arguments)` on ranges that together cover 0 … count."""
+        started = clock.perf_counter()
+        self._share(function, count, *arguments)
+        self.seconds += clock.perf_counter() - started
+
+    def _share(self, function: Callable, count: int, *arguments) -> None:
         if self._pool is None or count < 2:
             if count:
                 function(0, count, *arguments)

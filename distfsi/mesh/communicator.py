@@ -70,6 +70,24 @@ class Communicator:
         self.world.Allgatherv([rows.reshape(-1).view(np.uint8), MPI.BYTE], [everything, counts, None, MPI.BYTE])
         return everything.view(rows.dtype).reshape(-1, *rows.shape[1:])
 
+    def resliced(self, rows: np.ndarray, count: int) -> np.ndarray:
+        """This rank's `count` rows of all ranks' `rows` (n, ...), cut anew in rank order; counts add up to all n."""
+        rows = np.ascontiguousarray(rows)
+        ends = np.cumsum(self.allgather((len(rows), count)), axis=0)
+        before, after = (np.concatenate([[0], column]) for column in ends.T)
+
+        def shared(own: np.ndarray, others: np.ndarray) -> list[np.ndarray]:
+            """How many of this rank's rows each of the others has or gets, and where they begin here."""
+            first, end = own[self.rank], own[self.rank + 1]
+            low, high = np.clip(others[:-1], first, end), np.clip(others[1:], first, end)
+            return [high - low, low - first]
+
+        resliced = np.empty((count, *rows.shape[1:]), dtype=rows.dtype)
+        row = MPI.BYTE.Create_contiguous(int(np.prod(rows.shape[1:])) * rows.itemsize).Commit()
+        self.world.Alltoallv([rows, *shared(before, after), row], [resliced, *shared(after, before), row])
+        row.Free()
+        return resliced
+
     def maximum(self, values: np.ndarray) -> np.ndarray:
         """Element-wise largest float64 values over all ranks; a NaN on any rank comes out as inf."""
         values = np.asarray(values, dtype=np.float64)

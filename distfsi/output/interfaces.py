@@ -9,6 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 
 
+class Origin(Protocol):
+    """What a run goes on from: a state of this time [s] and step, and the last restart file, if there is one."""
+
+    time: float
+    step: int
+    path: Path | None
+
+
 class Communicator(Protocol):
     """The ranks of the run."""
 

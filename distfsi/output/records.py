@@ -9,19 +9,25 @@ import numpy as np
 
 from distfsi.output.fields import FieldWriter
 from distfsi.output.history import History
-from distfsi.output.restart import Restart, RestartWriter, Snapshot
+from distfsi.output.interfaces import Origin
+from distfsi.output.restart import RestartWriter, Snapshot
 from distfsi.output.schedule import Every
 from distfsi.output.storage import Storage
+
+BALANCE_COLUMNS = ("step", "time [s]", "busiest rank over mean", "blocks change hands")
 
 
 class Records:
     """Field files, history and restart files of a run; at a restart those up to `origin` are continued.
 
     What a run that died has written after the restart file is removed first, so that in the end the files are those of
-    a run that was never interrupted.
+    a run that was never interrupted. How evenly several ranks share the work is in a file of its own, since no result
+    depends on it: `balance.csv`.
+
+    restart  path of the last restart file, or None
     """
 
-    def __init__(self, simulation, accounts, storage: Storage, origin: Restart | None):
+    def __init__(self, simulation, accounts, storage: Storage, origin: Origin | None):
         """Collective. `accounts` gives the history its columns and rows. Raises OutputError on all ranks."""
         scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator
         directory = Path(scene.output.directory)
@@ -33,7 +39,9 @@ class Records:
         self._simulation, self._accounts, self._directory = simulation, accounts, directory
         self._fields_due, self._frame = Every(scene.output.fields_every), 0
         self._written_at = -1.0
-        self._restart = origin.path if origin else None
+        self.restart = origin.path if origin else None
+        if communicator.size > 1:
+            self._balance = History(directory / "balance.csv", BALANCE_COLUMNS, communicator, step)
 
     def write(self, always: bool = False) -> None:
         """Write what is due at the simulation's time, or fields and history `always`."""
@@ -52,12 +60,17 @@ class Records:
 
     def write_restart(self, snapshots: Mapping[str, Snapshot]) -> Path:
         """Write a restart file; its path."""
-        self._restart = self._restarts.write(self._simulation.steps, snapshots)
-        return self._restart
+        self.restart = self._restarts.write(self._simulation.steps, snapshots)
+        return self.restart
+
+    def write_balance(self, imbalance: float, changes_hands: bool) -> None:
+        """Note how evenly the ranks have computed, and whether blocks change hands now."""
+        simulation = self._simulation
+        self._balance.extend([[simulation.steps, simulation.time, imbalance, int(changes_hands)]])
 
     def left_behind(self) -> str:
         """What an invalid state has left, in words."""
-        last = f"the last restart file is {self._restart}" if self._restart else "there is no restart file"
+        last = f"the last restart file is {self.restart}" if self.restart else "there is no restart file"
         return f"the state is in the last field files in {self._directory}; {last}"
 
     def snapshot(self) -> Snapshot:

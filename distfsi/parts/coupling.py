@@ -223,6 +223,10 @@ class Coupling:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
         return self.kind[:, 0] >= kernels.COVERED
 
+    def workload(self) -> np.ndarray:
+        """(local blocks,) covered cells that fluxes see."""
+        return np.bincount(self._in_block(self._covered)[0], minlength=self.blocks.local_count).astype(float)
+
     def snapshot(self) -> Snapshot:
         """What a restart needs: which cells are covered, so that those are known that come free; and the books."""
         return {

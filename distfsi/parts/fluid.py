@@ -175,13 +175,22 @@ class Fluid:
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
-        return {"cells": {"state": self.blocks.without_ghosts(self.state)}, "sums": {"through": self._through}}
+        return {
+            "cells": {"state": self.blocks.without_ghosts(self.state)},
+            "sums": {"through": self._through, "rested": self.rest.counts[None]},
+        }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
         self._through[:] = snapshot["sums"]["through"]
+        self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
         self.rest.wake()
+
+    def workload(self) -> np.ndarray:
+        """(local blocks,) cells that a stage computes."""
+        cells = self.tiles[:, [kernels.NX, kernels.NY, kernels.NZ]].prod(axis=1) * ~self.rest.settled
+        return np.bincount(self.tiles[:, kernels.BLOCK], cells, self.blocks.local_count)
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""

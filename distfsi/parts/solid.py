@@ -247,6 +247,10 @@ class Solid:
         """Collective. Work [J] of gravity since the start."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
+    def workload(self) -> np.ndarray:
+        """(local blocks,) particles."""
+        return np.bincount(self._block, minlength=self.blocks.local_count).astype(float)
+
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
         sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}

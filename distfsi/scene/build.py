@@ -138,4 +138,4 @@ def build_performance(given: PerformanceInput, dimensions: int) -> Performance:
     """Block and tile sizes; a default tile is no larger than the block."""
     block = given.block_cells or BLOCK_CELLS[dimensions - 1]
     tile = given.tile_cells or tuple(map(min, TILE_CELLS[dimensions - 1], block))
-    return Performance(block, tile)
+    return Performance(block, tile, given.imbalance)

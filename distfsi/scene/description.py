@@ -422,6 +422,7 @@ class Performance:
 
     block_cells: tuple[int, ...]
     tile_cells: tuple[int, ...]
+    imbalance: float = 1.25  # computing time of the busiest rank over the mean from which on blocks change hands
 
 
 @dataclass(frozen=True)

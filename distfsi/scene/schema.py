@@ -240,6 +240,11 @@ class PerformanceInput(Table):
 
     block_cells: counts(4) | None = Field(None, description="cells of a block: [512], [128, 64], [64, 32, 32]")
     tile_cells: counts(1) | None = Field(None, description="cells of a tile: [512], [128, 32], [64, 8, 8]")
+    imbalance: float = Field(
+        1.25,
+        ge=1.0,
+        description="computing time of the busiest rank over the mean of all, from which on blocks change hands",
+    )
 
 
 class Sections(Table):
