@@ -50,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
     info = commands.add_parser("info", help="tell what an output directory holds")
     info.add_argument("directory", type=Path, help="output directory of a run")
     bench = commands.add_parser("bench", help="measure this machine's speed, as JSON; check then knows times")
+    bench.add_argument("what", nargs="?", choices=("ranks",), help="ranks: messages, waiting and uneven shares instead")
     bench.add_argument("--threads", type=int, help="threads per rank")
     bench.add_argument("--only", metavar="PART", help="only benchmarks whose name holds PART")
     study = commands.add_parser("study", help="compare with reference answers")
@@ -157,10 +158,13 @@ def info(arguments: argparse.Namespace) -> None:
 
 
 def bench(arguments: argparse.Namespace) -> None:
-    """Measure this machine."""
-    from distfsi.study import bench
+    """Measure this machine, or what its ranks cost."""
+    from distfsi.study import bench, bench_ranks
 
-    bench.main(_start_ranks(), arguments.threads, arguments.only)
+    if arguments.what == "ranks":
+        bench_ranks.main(_start_ranks(), arguments.threads)
+    else:
+        bench.main(_start_ranks(), arguments.threads, arguments.only)
 
 
 def study(arguments: argparse.Namespace) -> None:

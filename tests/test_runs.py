@@ -49,14 +49,15 @@ def test_sod(tmp_path):
 
 @pytest.mark.parametrize("scheme", ["MUSCL minmod", "MUSCL van Leer"])
 def test_water_air_beside_ecogen(tmp_path, scheme):
-    """Water at 1e9 Pa against air at 50 kg/m3, 1000 cells: errors within 20 % of ECOGEN's."""
+    """Water at 1e9 Pa against air at 50 kg/m3, 1000 cells: density and pressure no worse than ECOGEN's, velocity within
+    1.2 times."""
     reconstruction = {"MUSCL minmod": "minmod", "MUSCL van Leer": "van_leer"}[scheme]
     directory = run_input("water_air.toml", tmp_path, f"fluid.reconstruction={reconstruction}")
     time, x, *found = profile(directory)
     solution = exact_riemann(WATER_AIR.left, WATER_AIR.right, WATER_AIR.eos_left, WATER_AIR.eos_right)
-    errors = relative_errors(found, solution.sample((x - WATER_AIR_INTERFACE) / time)[:3])
+    density, velocity, pressure = relative_errors(found, solution.sample((x - WATER_AIR_INTERFACE) / time)[:3])
     peer = next(e for e in WATER_AIR_ERRORS if e.scheme == scheme and e.cells == 1000 and e.code.startswith("ECOGEN"))
-    assert np.all(np.array(errors) < 1.2 * np.array([peer.density, peer.velocity, peer.pressure])), errors
+    assert density <= peer.density and pressure <= peer.pressure and velocity <= 1.2 * peer.velocity
 
 
 def test_plate_impact(tmp_path):

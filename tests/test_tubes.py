@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from distfsi.scene.description import Ball, Box, FluidState, IdealGas, Jwl, Performance, Region
+from distfsi.scene.description import Ball, Box, FluidState, IdealGas, Jwl, Performance, Region, StiffenedGas
 from distfsi.study.exact import PureState, wave_into
 from distfsi.study.references import TNT_PRESSURE
 from fluids import AIR, TNT, WATER
-from tubes import OPEN, PERIODIC, Tube, advance, centers, fields, radial_mean, radii, scene_of, start
+from tubes import OPEN, PERIODIC, Tube, advance, centers, fields, scene_of, start
 
 LIGHT = IdealGas(1.2)
 MONATOMIC = IdealGas(5.0 / 3.0)
 SHYUE = Jwl(1.84, 8.545, 0.205, 4.6, 1.35, 0.25)  # Mbar, g/cm3
+EPOXY, SPINEL = StiffenedGas(2.43, 5.3e9), StiffenedGas(1.62, 141e9)
 LEE = Jwl(1.905, 632.1, -0.04472, 11.3, 1.13, 0.8938)
 SECOND_ORDER = {"reconstruction": "van_leer"}
 
@@ -38,6 +39,7 @@ TUBES = {
     "two gases": gas((1.0, 0.0, 1.0), (0.125, 0.0, 0.1), 0.5, 0.2, AIR, LIGHT),
     "water | dense air": gas((1000.0, 0.0, 1e9), (50.0, 0.0, 1e5), 0.7, 2.4e-4, WATER, AIR),
     "JWL | JWL": gas((1.7, 0.0, 10.0), (1.0, 0.0, 0.5), 0.5, 0.12, SHYUE),
+    "epoxy | spinel": gas((1185.0, 0.0, 2e11), (3622.0, 0.0, 1e5), 0.5, 3e-5, EPOXY, SPINEL),
 }
 STIFF = {
     "water | air": gas((1000.0, 0.0, 1e9), (1.2, 0.0, 1e5), 0.7, 2.4e-4, WATER, AIR),
@@ -66,11 +68,15 @@ def test_tube(name):
 
 
 def test_water_against_air():
-    """Density ratio 830, pressure ratio 1e4: the shock within 4 cells, the air between the waves within 1.5 %."""
+    """Density ratio 830, pressure ratio 1e4: the shock within 4 cells, nearer in metres on the finer mesh; the air
+    between the waves within 1.5 %."""
+    off = []
     for cells in (400, 1000):
         profile = STIFF["water | air"].run(cells, **SECOND_ORDER)
         found, exact = profile.shock()
-        assert abs(found - exact) <= 4.0 * profile.spacing
+        off.append(abs(found - exact))
+        assert off[-1] <= 4.0 * profile.spacing
+    assert off[1] < 0.7 * off[0]
     _, (state, expected) = profile.plateaus()
     assert np.allclose(state, expected, rtol=0.015)
 
@@ -250,95 +256,3 @@ def test_adaptive_flux_has_the_same_bits_on_any_cut(dimensions):
         results.append(fields(advance(start(scene))))
     for name, values in results[0].items():
         assert np.array_equal(values, results[1][name]), name
-
-
-# ---- blasts and implosions -------------------------------------------------------------------------------------------
-
-QUADRANT = ("symmetry", "outflow")
-
-
-def sedov(dimensions, cells, size, energy, radius):
-    """Radius of the shock and central pressure at time 1 of a point blast in air of density 1, over exact ones, and the
-    largest density.
-
-    The shock is where the mean pressure of a ring is half the exact one behind a shock at `radius`.
-    """
-    D = dimensions
-    regions = (Region(FluidState(0, 1.0, 1e-6, (0.0,) * D), None),)
-    scene = scene_of(
-        (AIR,), regions, (0.0,) * D, (size,) * D, (cells,) * D, 1.0, (QUADRANT,) * D, riemann="adaptive", **SECOND_ORDER
-    )
-    simulation = start(scene)
-    h = size / cells
-    inside = [r < 2.5 * h for r in radii(simulation)]
-    share = energy / 2**D / (sum(part.sum() for part in inside) * h**D)
-    for block, part in enumerate(inside):
-        simulation.fluid.cells(block)[-1][part] += share
-    advance(simulation)
-    r, p = radial_mean(simulation, "pressure")
-    speed = 2.0 / (D + 2.0) * radius
-    level = 0.5 * (2.0 / 2.4 * speed**2)
-    last = np.flatnonzero(p > level)[-1]
-    shock = r[last] + h * (p[last] - level) / (p[last] - p[last + 1])
-    return shock / radius, p[r < 0.4 * radius][-1] / CENTRAL_PRESSURE[D], fields(simulation)["density"].max()
-
-
-CENTRAL_PRESSURE = {2: 0.04376, 3: 0.0487351}  # at 0.4 of the radius: Sedov's solution with the energies below
-
-
-def test_cylindrical_blast():
-    """Kamm and Timmes: E = 0.311357 brings the shock to r = 0.75; here in 67 cells."""
-    shock, pressure, density = sedov(2, 86, 0.96, 0.311357, 0.75)
-    assert shock == pytest.approx(1.0, abs=0.0075)
-    assert pressure == pytest.approx(1.0, abs=0.05)
-    assert density > 4.0
-
-
-@full
-def test_cylindrical_blast_fine():
-    """100 cells to the shock: its radius within 0.5 %, the density's peak at least 4 of 6."""
-    shock, pressure, density = sedov(2, 128, 0.96, 0.311357, 0.75)
-    assert shock == pytest.approx(1.0, abs=0.005)
-    assert pressure == pytest.approx(1.0, abs=0.05)
-    assert density > 4.5
-
-
-@full
-def test_spherical_blast():
-    """E = 0.851072 brings the shock to r = 1; here in 33 cells."""
-    shock, pressure, density = sedov(3, 40, 1.2, 0.851072, 1.0)
-    assert shock == pytest.approx(1.0, abs=0.015)
-    assert pressure == pytest.approx(1.0, abs=0.05)
-    assert density > 3.4
-
-
-def noh(dimensions, cells, pressure, **method):
-    """Gas that falls to the centre with speed 1 from everywhere, at time 0.6: r and density over its exact 4^D."""
-    D = dimensions
-    regions = (Region(FluidState(0, 1.0, pressure, (0.0,) * D), None),)
-    simulation = start(
-        scene_of((MONATOMIC,), regions, (0.0,) * D, (1.0,) * D, (cells,) * D, 0.6, (QUADRANT,) * D, **method)
-    )
-    domain = simulation.blocks
-    for block, r in enumerate(radii(simulation)):
-        U = simulation.fluid.cells(block)
-        for d, x in enumerate(domain.cell_centers(block)[:D]):
-            U[1 + d] = -x.reshape([-1 if axis == 2 - d else 1 for axis in range(3)]) / r
-        U[-1] += 0.5
-    r, density = radial_mean(advance(simulation), "density")
-    return r, density / 4**D
-
-
-@full
-@pytest.mark.parametrize(
-    ("dimensions", "cells", "pressure", "plateau", "shock"), [(1, 200, 1e-6, 0.01, 0.005), (2, 100, 1e-6, 0.03, 0.02)]
-)
-def test_noh(dimensions, cells, pressure, plateau, shock, record_property):
-    """The shock stands at r = 0.2; behind it the density is 4^D, but for wall heating near the centre."""
-    r, density = noh(dimensions, cells, pressure, riemann="adaptive", **SECOND_ORDER)
-    record_property("density at the centre", density[0])
-    behind = (r > 0.08) & (r < 0.16)
-    assert density[behind].mean() == pytest.approx(1.0, abs=plateau)
-    ahead = 4.0 ** (dimensions - 1) / 4.0**dimensions
-    found = r[np.flatnonzero(density > 0.5 * (1.0 + ahead))[-1]]
-    assert abs(found - 0.2) <= 1.5 / cells + shock * 0.2

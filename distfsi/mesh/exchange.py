@@ -99,6 +99,11 @@ class GhostExchange:
         MPI.Request.Waitall(self._requests)
         self._run(*self._unpack)
 
+    def traffic(self, field: np.ndarray) -> tuple[int, int]:
+        """Bytes and messages that this rank sends in one exchange of `field`."""
+        outgoing = self._plan(field.shape[1], field.dtype).outgoing
+        return outgoing.values.nbytes, len(outgoing.parts)
+
     def _run(self, table: np.ndarray, destination: np.ndarray, source: np.ndarray, mirror: np.ndarray) -> None:
         if len(table):
             self._copy(0, len(table), table, destination, source, mirror)

@@ -24,7 +24,7 @@ from distfsi.parts.accounts import Accounts
 from distfsi.parts.fluid import Fluid
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
-from distfsi.study.works import COUPLED, FLUIDS, SMALLEST, SOLIDS
+from distfsi.study.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLIDS
 
 REPEATS = 5
 RIPPLE = 1e-4  # relative
@@ -164,7 +164,7 @@ def main(communicator: Communicator, threads: int | None, only: str | None = Non
     }
     works: tuple[tuple[Mapping[str, Callable[[], Scene]], Callable[..., Result]], ...] = (
         ({f"smallest_{name}": work for name, work in SMALLEST.items()}, bench_smallest),
-        (FLUIDS, bench_fluid),
+        (FLUIDS | SIZES, bench_fluid),
         (SOLIDS | COUPLED, bench_solid),
     )
     for named, measure in works:

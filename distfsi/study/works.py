@@ -78,6 +78,11 @@ FLUIDS: dict[str, Callable[[], scene.Scene]] = {
     "tnt_air_2d": lambda: gases((1024, 512), (TNT, AIR), BURNT_TNT, AMBIENT_AIR),
     "euler_2d": lambda: gases((1024, 512), (AIR,), (1.0, 10.0), (1.0, 1.0)),
 }
+SIZES = {
+    f"shock_bubble_2d_{name}_cells": lambda cells=cells: gases(cells, *TWO_GASES)
+    for name, cells in (("1e5", (384, 260)), ("1e6", (1280, 780)), ("1e7", (3968, 2520)))
+}
+"""The same flow from small to large: what a cell costs should not depend on how many there are."""
 SOLIDS = {
     "copper_block_1d": lambda: copper(4096, 1),
     "copper_block_2d": lambda: copper(128, 2),
