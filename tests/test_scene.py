@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 
 from distfsi.errors import InputError
 from distfsi.scene import load, schema
-from distfsi.scene.description import Ball, JohnsonCook, Jwl, NoStrength, StiffenedGas
+from distfsi.scene.description import (
+    Ball,
+    JohnsonCook,
+    JohnsonCookFailure,
+    Jwl,
+    LinearHardening,
+    NoStrength,
+    Scatter,
+    StiffenedGas,
+)
 from distfsi.scene.reference import markdown
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
 from distfsi.scene.units import UNITS, parse_unit, to_si
@@ -97,9 +106,67 @@ strength = { kind = "elastic", shear_modulus = "1 GPa" }
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((64, 32, 32), (64, 8, 8))
     assert scene.fluid.inflow == ((None, None),) * 3
     assert scene.solid.bodies[0].velocity == (0.0, 0.0, 0.0)
-    shell = "solid.bodies.one.shape={kind='tube', center=[0.5, 0.5, 1], inner_radius=0.2, outer_radius=0.3}"
-    expected = "a tube is packed in 2D only; not available yet in other dimensions"
-    assert faults(text, shell) == [f"solid.bodies.one.shape (--set): {expected}"]
+    body = "solid.bodies.one"
+    assert faults(text, f"{body}.packing=rings") == [
+        f"{body}.packing (--set): 'rings' need a tube or ball in 2D, or a cylinder"
+    ]
+    assert faults(text, f"{body}.lattice_angle=30 deg", "domain.lower=[0.4, 0, 0]", "domain.x=symmetry") != []
+    hollow = {"start": "[0, 0.5, 1]", "end": "[1, 0.5, 1]", "radius": "0.2", "inner_radius": "0.3"}
+    cylinder = ", ".join(f"{key} = {value}" for key, value in hollow.items())
+    assert faults(text, f"{body}.shape={{kind = 'cylinder', {cylinder}}}") == [
+        f"{body}.shape (--set): inner_radius must be smaller than radius"
+    ]
+
+
+METAL = """
+[domain]
+lower = [0, 0]
+upper = [1, 1]
+cells = [10, 10]
+[time]
+end = 1
+[solid]
+objective_rate = "green_naghdi"
+[solid.bodies.one]
+shape = { kind = "ball", center = [0.5, 0.5], radius = 0.2 }
+spacing = 0.05
+density = 1000
+eos = { kind = "linear", bulk_modulus = "2 GPa" }
+strength = { kind = "linear_hardening", shear_modulus = "1 GPa", yield_stress = "1 MPa", hardening_modulus = "2 MPa" }
+fixed = { kind = "half_space", point = [0.4, 0], normal = [1, 0] }
+fixed_velocity = [10, 0]
+radial_velocity = 3
+packing = "rings"
+[solid.bodies.one.failure]
+kind = "johnson_cook"
+D1 = 0.05
+D2 = 3.44
+D3 = -2.12
+spall_strength = "3 GPa"
+fracture_energy = "20 kJ/m2"
+scatter = { modulus = 10, size = "2 mm", seed = 7 }
+"""
+
+
+def test_what_breaks_and_moves_a_body(tmp_path, faults):
+    (tmp_path / "metal.toml").write_text(METAL)
+    solid = load(tmp_path / "metal.toml").solid
+    (body,) = solid.bodies
+    assert solid.objective_rate == "green_naghdi"
+    assert body.strength == LinearHardening(1e9, 1e6, 2e6)
+    assert body.failure == JohnsonCookFailure(0.05, 3.44, -2.12, 0.0, 0.0, 1.0, 3e9, 2e4, Scatter(10.0, 2e-3, 7))
+    assert (body.fixed_velocity, body.radial_velocity, body.packing) == ((10.0, 0.0), 3.0, "rings")
+    one = "solid.bodies.one"
+    assert faults(METAL, f"{one}.lattice_angle=30 deg", f"{one}.shape.radius=0.1", f"{one}.eos={COMPACTION}") == [
+        f"{one}.lattice_angle (--set): needs packing = 'lattice', another shape than a half space, 2D or 3D",
+        f"{one}.strength (line 15): 'concrete' and the eos 'compaction' need each other",
+    ]
+
+
+COMPACTION = (
+    "{kind='compaction', crush_pressure=16e6, crush_strain=0.001, lock_pressure=0.8e9, lock_strain=0.1, "
+    "K1=85e9, K2=-171e9, K3=208e9}"
+)
 
 
 # ---- overrides -------------------------------------------------------------------------------------------------------
@@ -194,15 +261,16 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
         "did you mean 'gamma'?",
         'fluid.regions.0.density (line 18): "1.2 kg/m2" has units kg/m2, needs kg/m3',
         "fluid.regions.1.phase (line 22): \"aer\"; expected one of 'air', 'sea water'; did you mean 'air'?",
-        "fluid.regions.1.shape.kind (line 25): \"bal\"; expected one of 'box', 'ball', 'half_space', 'tube'; "
-        "did you mean 'ball'?",
+        "fluid.regions.1.shape.kind (line 25): \"bal\"; expected one of 'box', 'ball', 'half_space', 'tube', "
+        "'cylinder'; did you mean 'ball'?",
         "solid.bodies.tube.density (line 26): is missing; expected density at rest [kg/m3]",
         "solid.bodies.tube.shape.center (line 27): [0] has 1 entries, needs 2, one per dimension of the domain",
         "solid.bodies.tube.spacing (line 28): \"0.1 fs\" has the unknown unit 'fs'; did you mean 's'?",
         "solid.bodies.tube.eos (line 29): 3; expected a table",
         "solid.bodies.tube.strength (line 30): \"nne\"; expected one of 'none', 'elastic', 'perfectly_plastic', "
-        "'johnson_cook'; did you mean 'none'?",
-        "solid.bodies.tube.fixed.kind (line 31): is missing; expected one of 'ball', 'box', 'half_space', 'tube'",
+        "'linear_hardening', 'johnson_cook', 'concrete'; did you mean 'none'?",
+        "solid.bodies.tube.fixed.kind (line 31): is missing; expected one of 'ball', 'box', 'cylinder', 'half_space', "
+        "'tube'",
         "output.history_every (line 33): 1.5; it should be a valid integer",
         "performance.tile_cells.0 (line 35): 0; must be >= 1",
     ]

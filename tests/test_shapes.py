@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from distfsi.scene.description import Ball, Body, Box, HalfSpace, LinearEos, NoStrength, Tube
-from distfsi.scene.packing import pack
-from distfsi.scene.shapes import bounding_box, cell_fractions, contains, distance, volume
+from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, LinearEos, NoStrength, Tube
+from distfsi.scene.packing import initial_velocity, pack
+from distfsi.scene.shapes import bounding_box, cell_fractions, contains, dimensions, distance, volume
 
 SHAPES = [
     Box((0.2,), (0.65,)),
@@ -22,8 +22,9 @@ SHAPES = [
 ]
 
 
-def body(shape, spacing):
-    return Body("body", shape, spacing, 1000.0, (0.0,) * 2, LinearEos(1e9), NoStrength(), None)
+def body(shape, spacing, **more):
+    rest = (0.0,) * dimensions(shape)
+    return Body("body", shape, spacing, 1000.0, rest, LinearEos(1e9), NoStrength(), None, **more)
 
 
 def unit_grid(cells, dimensions):
@@ -175,3 +176,53 @@ def test_nothing_outside_the_domain_is_packed():
         positions, volumes = pack(body(shape, 0.1), (0.0, 0.0), (1.0, 1.0))
         assert positions.shape == (0, 2)
         assert volumes.shape == (0,)
+
+
+@pytest.mark.parametrize("inner", [0.0, 0.21])
+@pytest.mark.parametrize("packing", ["rings", "lattice"])
+@pytest.mark.parametrize("end", [(0.0, 0.0, 1.03), (-1.0, 0.2, 0.4)])
+def test_a_cylinder_has_its_volume_however_it_is_packed(inner, packing, end):
+    cylinder = Cylinder((0.0, 0.0, 0.0), end, 0.43, inner)
+    positions, volumes = pack(body(cylinder, 0.1, packing=packing), (-2.0,) * 3, (2.0,) * 3)
+    assert volumes.sum() == pytest.approx(volume(cylinder), rel=1e-13)
+    assert contains(cylinder, positions).all()
+    assert positions.mean(axis=0) == pytest.approx(0.5 * np.asarray(end), abs=1e-12)
+    low, high = bounding_box(cylinder)
+    assert np.all(positions > low) and np.all(positions < high)
+    axis = np.asarray(end) / np.linalg.norm(end)
+    radii = np.linalg.norm(positions - np.outer(positions @ axis, axis), axis=1)
+    if packing == "rings":
+        assert radii.max() == pytest.approx(0.43 - 0.5 * (0.43 - inner) / round((0.43 - inner) / 0.1))
+        assert len(np.unique(radii.round(9))) == round((0.43 - inner) / 0.1)
+
+
+def test_a_quarter_of_a_cylinder_is_a_quarter():
+    bar = body(Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.32, 0.0), 0.05)
+    positions, volumes = pack(bar, (0.0, 0.0, 0.0), (1.0, 1.0, 2.0))
+    assert volumes.sum() == pytest.approx(0.25 * math.pi * 0.32**2, rel=1e-13)
+
+
+@pytest.mark.parametrize("shape", [Ball((0.1, 0.2), 1.0), Tube((0.1, 0.2), 0.5, 1.0), Box((0.0, 0.0), (1.5, 1.0))])
+def test_a_turned_lattice_keeps_the_volume(shape):
+    positions, volumes = pack(
+        body(shape, 0.05, packing="lattice", lattice_angle=math.pi / 6.0), (-2.0, -2.0), (2.0, 2.0)
+    )
+    assert volumes.sum() == pytest.approx(volume(shape), rel=1e-13)
+    assert nearest(positions) == pytest.approx(np.full(len(positions), 0.05))
+    offset = positions[np.argsort(np.linalg.norm(positions - positions[len(positions) // 2], axis=1))[1]]
+    direction = offset - positions[len(positions) // 2]
+    assert math.degrees(math.atan2(direction[1], direction[0])) % 90.0 == pytest.approx(30.0)
+
+
+def test_radial_velocities_keep_volumes_in_hollow_bodies_and_stretch_full_ones_evenly():
+    at = np.array([[0.6, 0.0], [0.0, 0.9]])
+    ring = initial_velocity(body(Tube((0.0, 0.0), 0.5, 1.0), 0.1, radial_velocity=10.0), at)
+    assert ring == pytest.approx(np.array([[10.0 * 0.5 / 0.6, 0.0], [0.0, 10.0 * 0.5 / 0.9]]))
+    disc = initial_velocity(body(Ball((0.0, 0.0), 1.0), 0.1, radial_velocity=10.0), at)
+    assert disc == pytest.approx(10.0 * at)
+    pipe = body(Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 0.5), 0.1, radial_velocity=-10.0)
+    assert initial_velocity(pipe, np.array([[0.6, 0.0, 0.3]])) == pytest.approx(np.array([[-10.0 * 0.5 / 0.6, 0, 0]]))
+    shell = body(Tube((0.0, 0.0, 0.0), 0.5, 1.0), 0.1, radial_velocity=10.0)
+    assert initial_velocity(shell, np.array([[0.0, 0.6, 0.0]])) == pytest.approx(
+        np.array([[0.0, 10.0 * (0.5 / 0.6) ** 2, 0.0]])
+    )

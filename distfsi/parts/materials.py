@@ -159,7 +159,8 @@ def failure_constants(failure: Failure | None, size: float) -> tuple[float, ...]
         case None:
             return *NO_FAILURE, size
         case JohnsonCookFailure(D1, D2, D3, D4, D5, reference_rate, spall_strength, fracture_energy):
-            return D1, D2, D3, D4, D5, reference_rate, spall_strength, fracture_energy, size
+            spall = math.inf if spall_strength is None else spall_strength
+            return D1, D2, D3, D4, D5, reference_rate, spall, fracture_energy, size
         case PrincipalStress(tensile_strength, fracture_energy):
             return *NO_FAILURE[:6], tensile_strength, fracture_energy, size
 

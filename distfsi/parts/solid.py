@@ -23,7 +23,7 @@ from distfsi.parts.materials import Materials
 from distfsi.parts.neighbours import NeighbourSearch
 from distfsi.physics.strength import von_mises
 from distfsi.scene.description import Scene
-from distfsi.scene.packing import pack
+from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
 
 DRIVERS = (
@@ -100,7 +100,7 @@ class Solid:
         return {
             "body": np.full(n, b),
             "position": position,
-            "velocity": np.where(fixed[:, None], 0.0, np.array(body.velocity)),
+            "velocity": np.where(fixed[:, None], body.fixed_velocity or 0.0, initial_velocity(body, position)),
             "fixed": fixed,
             "mass": body.density * volume,
             "density": np.full(n, body.density),
@@ -151,12 +151,13 @@ class Solid:
         impulse = np.zeros_like(c["velocity"]) if impulse is None else impulse
         weight = mass * self.gravity * dt
         received = mass * self._acceleration * dt
-        velocity = np.where(fixed, 0.0, c["velocity"] + (received + weight + impulse) / mass)
+        velocity = np.where(fixed, c["velocity"], c["velocity"] + (received + weight + impulse) / mass)
         mean = 0.5 * (c["velocity"] + velocity)
         self.work = self._per_block((impulse * mean).sum(axis=1, keepdims=True))[:, 0]
         self.given = self._per_block_and_body(impulse)
-        self._gravity_work += self._per_block((weight * mean).sum(axis=1, keepdims=True))[:, 0]
-        self._boundary_impulse += self._per_block(received + weight - fixed * (received + weight + impulse))
+        held = -fixed * (received + weight + impulse)  # impulse of what moves the fixed particles
+        self._gravity_work += self._per_block((weight * mean + held * velocity).sum(axis=1, keepdims=True))[:, 0]
+        self._boundary_impulse += self._per_block(received + weight + held)
 
         (around,) = self._plan.exchange([(velocity, self._vector)])
         gradient = np.empty((self._plan.own, self.dimensions**2))
@@ -244,7 +245,7 @@ class Solid:
         return self.blocks.sum(self._boundary_impulse)
 
     def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity since the start."""
+        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
     def workload(self) -> np.ndarray:

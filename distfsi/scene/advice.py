@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.description import Ball, Body, Box, Cylinder, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 
 AXES, ENDS = "xyz", ("low", "high")
@@ -98,6 +98,8 @@ def _extent(shape: Shape) -> float | None:
             return 2.0 * radius
         case Tube(_, inner, outer):
             return outer - inner
+        case Cylinder(start, end, outer, inner):
+            return min(math.dist(start, end), outer - inner if inner > 0.0 else 2.0 * outer)
 
 
 def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:

@@ -89,10 +89,15 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
             body.eos.build(),
             body.strength.build(),
             body.fixed.build() if body.fixed else None,
+            body.failure.build() if body.failure else None,
+            body.fixed_velocity,
+            body.radial_velocity,
+            body.packing,
+            body.lattice_angle,
         )
         for name, body in given.bodies.items()
     )
-    return Solid(bodies, given.smoothing, given.viscosity_alpha, given.viscosity_beta)
+    return Solid(bodies, given.smoothing, given.viscosity_alpha, given.viscosity_beta, given.objective_rate)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

@@ -11,9 +11,23 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from distfsi.scene.build import AXES, SIDES
-from distfsi.scene.description import Ball, Body, Domain, Fluid, FluidState, HalfSpace, Solid, Tube
+from distfsi.scene.description import (
+    Ball,
+    Body,
+    Box,
+    Compaction,
+    Concrete,
+    Cylinder,
+    Domain,
+    Fluid,
+    FluidState,
+    HalfSpace,
+    Shape,
+    Solid,
+    Tube,
+)
 from distfsi.scene.faults import Fault, Path, one_of
-from distfsi.scene.packing import pack
+from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     BodyGauge,
     DomainInput,
@@ -129,8 +143,9 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
         path = ("solid", "bodies", body.name)
-        if isinstance(body.shape, Tube) and domain.dimensions != 2:
-            yield Fault((*path, "shape"), "a tube is packed in 2D only; not available yet in other dimensions")
+        faults = list(_check_body(path, body, domain))
+        if faults:
+            yield from faults
             continue
         yield from _check_extent((*path, "shape"), body, domain)
         if (count := _number_of_particles(body, domain)) > MOST_PARTICLES:
@@ -147,6 +162,32 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield Fault(("solid", "bodies", second[0].name, "shape"), f"overlaps body '{first[0].name}'")
 
 
+def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
+    """What a body asks for goes together."""
+    shape, turned = body.shape, body.lattice_angle != 0.0
+    round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
+    if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
+        yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
+    if turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
+        yield Fault((*path, "lattice_angle"), "needs packing = 'lattice', another shape than a half space, 2D or 3D")
+    elif turned and _cut_off_axis(shape, domain):
+        yield Fault((*path, "lattice_angle"), "a turned lattice has no symmetry planes; expected a whole body")
+    if body.radial_velocity and isinstance(shape, Box | HalfSpace):
+        yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
+    if body.fixed_velocity and body.fixed is None:
+        yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
+    if isinstance(body.eos, Compaction) != isinstance(body.strength, Concrete):
+        yield Fault((*path, "strength"), "'concrete' and the eos 'compaction' need each other")
+
+
+def _cut_off_axis(shape: Shape, domain: Domain) -> bool:
+    """Whether the domain cuts a shape along another axis than the one its lattice turns about."""
+    lower, upper = bounding_box(shape)
+    turning = int(np.argmax(np.abs(np.subtract(shape.end, shape.start)))) if isinstance(shape, Cylinder) else 2
+    sides = zip(lower, upper, domain.lower, domain.upper, strict=True)
+    return any(axis != turning and (a < low or b > high) for axis, (a, b, low, high) in enumerate(sides))
+
+
 def _number_of_particles(body: Body, domain: Domain) -> float:
     """About how many particles it takes to pack a body."""
     match body.shape:
@@ -154,6 +195,8 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [outer - inner, math.pi * (outer + inner)]
         case Ball(_, radius):
             extents = [2.0 * radius] * domain.dimensions
+        case Cylinder(start, end, outer, inner):
+            extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
         case shape:
             lower, upper = bounding_box(shape)
             extents = np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower)

@@ -11,6 +11,7 @@ from typing import Literal
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Scheme = Literal["rk2", "rk3"]
+Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
@@ -44,14 +45,24 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Tube:
-    """Ring (2D) or spherical shell (3D) between two radii about `center` [m]; packed with rings of particles."""
+    """Ring (2D) or spherical shell (3D) between two radii about `center` [m]."""
 
     center: tuple[float, ...]
     inner_radius: float
     outer_radius: float
 
 
-Shape = Box | Ball | HalfSpace | Tube
+@dataclass(frozen=True)
+class Cylinder:
+    """Cylinder (3D) about the line from `start` to `end` [m], hollow when inner_radius > 0 [m]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    radius: float
+    inner_radius: float
+
+
+Shape = Box | Ball | HalfSpace | Tube | Cylinder
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
@@ -254,7 +265,7 @@ class JohnsonCookFailure:
     D4: float
     D5: float
     reference_rate: float
-    spall_strength: float
+    spall_strength: float | None
     fracture_energy: float
     scatter: Scatter | None
 
@@ -273,7 +284,13 @@ Failure = JohnsonCookFailure | PrincipalStress
 
 @dataclass(frozen=True)
 class Body:
-    """A solid body packed with particles `spacing` [m] apart. Particles inside `fixed` (if any) do not move."""
+    """A solid body packed with particles `spacing` [m] apart.
+
+    Particles inside `fixed` (if any) keep fixed_velocity [m/s]. To `velocity` comes radial_velocity [m/s], outward at
+    the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
+    `packing` (None: what suits the shape): rings along the surface or a lattice, turned by lattice_angle [rad] about a
+    cylinder's axis or the z axis.
+    """
 
     name: str
     shape: Shape
@@ -284,6 +301,10 @@ class Body:
     strength: Strength
     fixed: Shape | None
     failure: Failure | None = None
+    fixed_velocity: tuple[float, ...] | None = None
+    radial_velocity: float = 0.0
+    packing: Packing | None = None
+    lattice_angle: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,28 @@ class Tube(Mirror):
         return self
 
 
-Shape = Annotated[Box | Ball | HalfSpace | Tube, Field(discriminator="kind")]
+class Cylinder(Mirror):
+    """Cylinder (3D), full or hollow."""
+
+    describes = description.Cylinder
+    kind: Literal["cylinder"]
+    start: Position = Field(description="where its axis begins")
+    end: Position = Field(description="where its axis ends")
+    radius: Length = Field(description="radius")
+    inner_radius: quantity("m", ge=0.0) = Field(0.0, description="radius of the hole; 0: none")
+
+    @model_validator(mode="after")
+    def _has_an_inside(self) -> Cylinder:
+        if len(self.start) != 3:
+            raise ValueError("a cylinder needs three dimensions; in two it is a ball, hollow a tube")
+        if self.start == self.end:
+            raise ValueError("start and end must differ")
+        if self.inner_radius >= self.radius:
+            raise ValueError("inner_radius must be smaller than radius")
+        return self
+
+
+Shape = Annotated[Box | Ball | HalfSpace | Tube | Cylinder, Field(discriminator="kind")]
 
 
 # ---- fluids ----------------------------------------------------------------------------------------------------------
@@ -144,6 +165,27 @@ class LinearEos(Mirror):
     bulk_modulus: PositivePressure = Field(description="bulk modulus K")
 
 
+class Compaction(Mirror):
+    """Concrete, with strength `concrete`: elastic to the crush point, pores closing up to the lock pressure, then dense
+    with p = K1 x + K2 x^2 + K3 x^3, x = (rho/rho0 - 1 - lock_strain)/(1 + lock_strain)."""
+
+    describes = description.Compaction
+    kind: Literal["compaction"]
+    crush_pressure: PositivePressure = Field(description="pressure at which pores begin to close")
+    crush_strain: PositiveNumber = Field(description="rho/rho0 - 1 there")
+    lock_pressure: PositivePressure = Field(description="pressure at which all pores are closed")
+    lock_strain: PositiveNumber = Field(description="rho/rho0 - 1 of the material without pores, at no pressure")
+    K1: PositivePressure = Field(description="dense material, first coefficient")
+    K2: Pressure = Field(description="second")
+    K3: Pressure = Field(description="third")
+
+    @model_validator(mode="after")
+    def _crushes_before_it_locks(self) -> Compaction:
+        if self.crush_pressure >= self.lock_pressure or self.crush_strain >= self.lock_strain:
+            raise ValueError("the crush point must lie below the lock point")
+        return self
+
+
 class NoStrength(Mirror):
     """No deviatoric stress."""
 
@@ -166,6 +208,16 @@ class PerfectlyPlastic(Mirror):
     kind: Literal["perfectly_plastic"]
     shear_modulus: PositivePressure = Field(description="shear modulus G")
     yield_stress: PositivePressure = Field(description="yield stress")
+
+
+class LinearHardening(Mirror):
+    """Yield stress that grows linearly with the plastic strain."""
+
+    describes = description.LinearHardening
+    kind: Literal["linear_hardening"]
+    shear_modulus: PositivePressure = Field(description="shear modulus G")
+    yield_stress: PositivePressure = Field(description="initial yield stress")
+    hardening_modulus: quantity("Pa", ge=0.0) = Field(description="its growth with plastic strain")
 
 
 class JohnsonCook(Mirror):
@@ -192,14 +244,79 @@ class JohnsonCook(Mirror):
         return self
 
 
-SolidEos = Annotated[MieGrueneisen | LinearEos, Field(discriminator="kind")]
+class Concrete(Mirror):
+    """Concrete of Holmquist, Johnson & Cook: yield at f_c (A (1 - wear) + B p*^N)(1 + C ln(rate/reference_rate)), at
+    most cap f_c. It needs the eos `compaction`; cracks in tension come from a `failure`."""
+
+    describes = description.Concrete
+    kind: Literal["concrete"]
+    shear_modulus: PositivePressure = Field(description="shear modulus G")
+    compressive_strength: PositivePressure = Field(description="uniaxial compressive strength f_c")
+    tensile_strength: PositivePressure = Field(description="largest hydrostatic tension T")
+    A: quantity("1", ge=0.0) = Field(description="cohesion")
+    B: quantity("1", ge=0.0) = Field(description="hardening by pressure p* = p/f_c")
+    N: PositiveNumber = Field(description="its exponent")
+    C: quantity("1", ge=0.0) = Field(description="rate coefficient")
+    cap: PositiveNumber = Field(7.0, description="largest strength over f_c")
+    D1: PositiveNumber = Field(description="wear: failure strain D1 (p* + T*)^D2")
+    D2: quantity("1", ge=0.0) = Field(1.0, description="its exponent")
+    least_failure_strain: PositiveNumber = Field(description="and its floor")
+    reference_rate: quantity("1/s", gt=0.0) = Field(1.0, description="strain rate at which the rate factor is one")
+
+
+# ---- failure ---------------------------------------------------------------------------------------------------------
+
+
+class Scatter(Mirror):
+    """Weibull's scatter of the failure strain and stress from particle to particle; larger ones fail earlier."""
+
+    describes = description.Scatter
+    modulus: PositiveNumber = Field(description="Weibull modulus: the larger, the less scatter")
+    size: Length = Field(description="edge of a piece (square, cube) that has the given values on average")
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="chooses one of the possible specimens")
+
+
+Energy = quantity("J/m2", ge=0.0)
+FRACTURE = "energy that a crack takes per area, at any spacing; 0: failure at once"
+
+
+class JohnsonCookFailure(Mirror):
+    """Fracture strain (D1 + D2 exp(D3 eta))(1 + D4 ln(rate/reference_rate))(1 + D5 T*), eta = mean/von Mises stress."""
+
+    describes = description.JohnsonCookFailure
+    kind: Literal["johnson_cook"]
+    D1: Number = Field(description="fracture strain at large tension")
+    D2: Number = Field(description="its growth towards compression")
+    D3: Number = Field(description="exponent; negative, tension positive")
+    D4: Number = Field(0.0, description="rate coefficient")
+    D5: Number = Field(0.0, description="temperature coefficient")
+    reference_rate: quantity("1/s", gt=0.0) = Field(1.0, description="strain rate at which the rate factor is one")
+    spall_strength: PositivePressure | None = Field(None, description="principal stress that also breaks it")
+    fracture_energy: Energy = Field(0.0, description=FRACTURE)
+    scatter: Scatter | None = Field(None, description="Weibull's scatter; default none")
+
+
+class PrincipalStress(Mirror):
+    """A crack opens where the largest principal stress reaches the tensile strength."""
+
+    describes = description.PrincipalStress
+    kind: Literal["principal_stress"]
+    tensile_strength: PositivePressure = Field(description="principal stress that breaks it")
+    fracture_energy: Energy = Field(0.0, description=FRACTURE)
+    scatter: Scatter | None = Field(None, description="Weibull's scatter; default none")
+
+
+Failure = Annotated[JohnsonCookFailure | PrincipalStress, Field(discriminator="kind")]
+SolidEos = Annotated[MieGrueneisen | LinearEos | Compaction, Field(discriminator="kind")]
 
 
 def _word_as_table(value: Any) -> Any:
     return {"kind": value} if isinstance(value, str) else value
 
 
-StrengthTable = Annotated[NoStrength | Elastic | PerfectlyPlastic | JohnsonCook, Field(discriminator="kind")]
+StrengthTable = Annotated[
+    NoStrength | Elastic | PerfectlyPlastic | LinearHardening | JohnsonCook | Concrete, Field(discriminator="kind")
+]
 Strength = Annotated[
     StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=StrengthTable | Literal["none"])
 ]

@@ -7,29 +7,58 @@ import math
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, HalfSpace, Tube
-from distfsi.scene.shapes import bounding_box, contains, volume
+from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, Tube
+from distfsi.scene.shapes import bounding_box, contains, cylinder_coordinates, volume
 
 
 def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Particles of `body` inside the domain [lower, upper]: positions (n, D) [m], volumes (n,) [m^D].
 
     A Box is cut to the domain and filled exactly; a Ball gets a lattice about its center, a HalfSpace one that fills
-    the domain, a Tube (2D) rings. Lattice and rings leave planes through the center between particles.
+    the domain, a Tube (2D) and a Cylinder rings, unless the body asks for the other. Lattice and rings leave planes
+    through the center between particles.
     """
     lower, upper = np.asarray(lower), np.asarray(upper)
     match body.shape:
-        case Box(low, high):
+        case Box(low, high) if body.lattice_angle == 0.0:
             positions, each = _fill(np.maximum(low, lower), np.minimum(high, upper), body.spacing)
             return positions, np.full(len(positions), each)
         case HalfSpace():
             return _half_space(body.shape, lower, upper, body.spacing)
-        case Ball():
-            positions, volumes = _ball(body.shape, body.spacing)
-        case Tube():
-            positions, volumes = _rings(body.shape, body.spacing)
+    positions, volumes = _in_rings(body) if uses_rings(body) else _in_lattice(body)
     inside = np.all((positions > lower) & (positions < upper), axis=1)
     return positions[inside], volumes[inside]
+
+
+def uses_rings(body: Body) -> bool:
+    """Whether a body is packed with rings: what it asks for or, by default, tubes in 2D and cylinders are."""
+    suits = isinstance(body.shape, Cylinder) or (isinstance(body.shape, Tube) and len(body.shape.center) == 2)
+    return suits if body.packing is None else body.packing == "rings"
+
+
+def initial_velocity(body: Body, positions: np.ndarray) -> np.ndarray:
+    """Velocities (n, D) [m/s] at the start of the particles at `positions` (n, D) that are not fixed."""
+    velocity = np.broadcast_to(np.asarray(body.velocity, dtype=float), positions.shape)
+    if body.radial_velocity == 0.0:
+        return velocity
+    match body.shape:
+        case Ball(center, radius):
+            return velocity + body.radial_velocity / radius * (positions - np.asarray(center))
+        case Tube(center, inner):
+            outward = positions - np.asarray(center)
+            power = len(center)
+        case Cylinder(start, end, radius, inner):
+            along, _ = cylinder_coordinates(body.shape, positions)
+            axis = (np.asarray(end) - np.asarray(start)) / math.dist(start, end)
+            outward = positions - np.asarray(start) - along[:, None] * axis
+            power = 2
+            if inner == 0.0:
+                return velocity + body.radial_velocity / radius * outward
+    r = np.sqrt((outward**2).sum(axis=1, keepdims=True))
+    return velocity + body.radial_velocity * inner ** (power - 1) * outward / r**power
+
+
+# ---- lattices --------------------------------------------------------------------------------------------------------
 
 
 def _fill(lower: np.ndarray, upper: np.ndarray, spacing: float) -> tuple[np.ndarray, float]:
@@ -43,12 +72,43 @@ def _fill(lower: np.ndarray, upper: np.ndarray, spacing: float) -> tuple[np.ndar
     return np.stack([g.ravel() for g in reversed(grids)], axis=1), math.prod(extent / counts)
 
 
-def _ball(shape: Ball, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    half = math.ceil(shape.radius / spacing) * spacing
-    center = np.asarray(shape.center)
-    lattice, _ = _fill(center - half, center + half, spacing)
-    positions = lattice[contains(shape, lattice)]
+def _in_lattice(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Particles of a cubic lattice that lie in the shape; a turned one turns about z, in a cylinder about its axis."""
+    shape, spacing = body.shape, body.spacing
+    if isinstance(shape, Cylinder):
+        points, _ = _layers(shape, _square(2, shape.radius, spacing, body.lattice_angle), spacing)
+    else:
+        low, high = (np.asarray(corner) for corner in bounding_box(shape))
+        points = 0.5 * (low + high) + _square(len(low), 0.5 * math.dist(low, high), spacing, body.lattice_angle)
+    positions = points[contains(shape, points)]
     return positions, np.full(len(positions), volume(shape) / max(len(positions), 1))
+
+
+def _square(dimensions: int, reach: float, spacing: float, angle: float) -> np.ndarray:
+    """Points (n, D) of a lattice about the origin as far as `reach` [m], turned by `angle` [rad] in the x-y plane."""
+    half = math.ceil(reach / spacing) * spacing
+    points, _ = _fill(np.full(dimensions, -half), np.full(dimensions, half), spacing)
+    if angle:
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        points[:, :2] = points[:, :2] @ turn
+    return points
+
+
+def _layers(shape: Cylinder, section: np.ndarray, spacing: float) -> tuple[np.ndarray, float]:
+    """Points (n, 3): a `section` (k, 2) about the axis, repeated along the cylinder, and the height of a layer [m]."""
+    length = math.dist(shape.start, shape.end)
+    layers = max(1, round(length / spacing))
+    heights = (np.arange(layers) + 0.5) * (length / layers)
+    local = np.hstack([np.tile(section, (layers, 1)), np.repeat(heights, len(section))[:, None]])
+    return np.asarray(shape.start) + local @ _frame(shape), length / layers
+
+
+def _frame(shape: Cylinder) -> np.ndarray:
+    """(3, 3) unit vectors: two across a cylinder, one along it. Of an axis-parallel cylinder all are axis-parallel."""
+    axis = (np.asarray(shape.end) - np.asarray(shape.start)) / math.dist(shape.start, shape.end)
+    first = np.cross(np.roll(np.eye(3)[np.argmax(np.abs(axis))], -1), axis)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first), axis])
 
 
 def _half_space(
@@ -71,15 +131,32 @@ def _clipped_volume(shape: HalfSpace, lower: np.ndarray, upper: np.ndarray) -> f
     return math.prod(extent) * math.fsum(terms) / (math.factorial(len(slopes)) * math.prod(slopes))
 
 
-def _rings(shape: Tube, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rings of equal thickness, each with a multiple of four particles about `spacing` apart."""
-    thickness = shape.outer_radius - shape.inner_radius
-    edges = np.linspace(shape.inner_radius, shape.outer_radius, max(1, round(thickness / spacing)) + 1)
+# ---- rings -----------------------------------------------------------------------------------------------------------
+
+
+def _in_rings(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Particles in rings that follow the surface: of a tube or ball (2D), in layers of a cylinder."""
+    match body.shape:
+        case Tube(center, inner, outer):
+            positions, volumes = _rings(inner, outer, body.spacing)
+            return positions + np.asarray(center), volumes
+        case Ball(center, radius):
+            positions, volumes = _rings(0.0, radius, body.spacing)
+            return positions + np.asarray(center), volumes
+        case Cylinder(_, _, outer, inner):
+            section, areas = _rings(inner, outer, body.spacing)
+            positions, height = _layers(body.shape, section, body.spacing)
+            return positions, np.tile(areas * height, len(positions) // len(section))
+
+
+def _rings(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rings of equal thickness about the origin, each with a multiple of four particles about `spacing` apart."""
+    edges = np.linspace(inner, outer, max(1, round((outer - inner) / spacing)) + 1)
     positions, volumes = [], []
-    for inner, outer in itertools.pairwise(edges):
-        radius = 0.5 * (inner + outer)
+    for low, high in itertools.pairwise(edges):
+        radius = 0.5 * (low + high)
         count = 4 * max(1, round(0.5 * math.pi * radius / spacing))
         angle = (np.arange(count) + 0.5) * (2.0 * math.pi / count)
-        positions.append(np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius + np.asarray(shape.center))
-        volumes.append(np.full(count, math.pi * (outer**2 - inner**2) / count))
+        positions.append(np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius)
+        volumes.append(np.full(count, math.pi * (high**2 - low**2) / count))
     return np.concatenate(positions), np.concatenate(volumes)

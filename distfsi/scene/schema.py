@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.mirrors import PhaseInput, Shape, SolidEos, Strength
+from distfsi.scene.mirrors import Failure, PhaseInput, Shape, SolidEos, Strength
 from distfsi.scene.values import (
     Acceleration,
     Count,
@@ -117,13 +117,24 @@ class FluidInput(Table):
 class BodyInput(Table):
     """A solid body packed with particles."""
 
-    shape: Shape = Field(description="box, ball, half_space (cut to the domain) or tube")
+    shape: Shape = Field(description="box, ball, half_space (cut to the domain), tube or cylinder")
     spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
     density: Density = Field(description="density at rest")
     velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
     eos: SolidEos = Field(description="pressure law")
     strength: Strength = Field(description='strength model, or "none"')
-    fixed: Shape | None = Field(None, description="particles in here do not move")
+    failure: Failure | None = Field(None, description="what breaks it; default nothing")
+    fixed: Shape | None = Field(None, description="particles that start in here keep fixed_velocity")
+    fixed_velocity: Velocity | None = Field(None, description="velocity of the fixed particles; default at rest")
+    radial_velocity: quantity("m/s") = Field(
+        0.0, description="initial speed away from center or axis at the surface; hollow bodies: the inner one"
+    )
+    packing: description.Packing | None = Field(
+        None, description="lattice, or rings along the surface (tube in 2D, cylinder, ball in 2D); default what suits"
+    )
+    lattice_angle: quantity("rad") = Field(
+        0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
+    )
 
 
 class SolidInput(Table):
@@ -133,6 +144,9 @@ class SolidInput(Table):
     smoothing: quantity("1", ge=1.0, le=3.0) = Field(1.3, description="smoothing length over particle spacing")
     viscosity_alpha: quantity("1", ge=0.0) = Field(1.0, description="linear artificial viscosity")
     viscosity_beta: quantity("1", ge=0.0) = Field(2.0, description="quadratic artificial viscosity")
+    objective_rate: description.ObjectiveRate = Field(
+        "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
+    )
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

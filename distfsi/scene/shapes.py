@@ -6,20 +6,23 @@ import math
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Box, HalfSpace, Shape, Tube
+from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Shape, Tube
 
 SUBPOINTS = 8  # per axis, in cells that a curved or oblique surface may cut
 
 
 def dimensions(shape: Shape) -> int:
     """Number of coordinates that the shape is given in."""
-    return len(shape.lower if isinstance(shape, Box) else shape.point if isinstance(shape, HalfSpace) else shape.center)
+    match shape:
+        case Box(corner, _) | HalfSpace(corner, _) | Cylinder(corner):
+            return len(corner)
+    return len(shape.center)
 
 
 def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     """Signed distance [m] of `points` (n, D) to the surface of `shape`, negative inside -> (n,).
 
-    Outside the corners of a Box it is the largest of the distances to its faces.
+    Outside the edges of a Box or a Cylinder it is the largest of the distances to its faces.
     """
     match shape:
         case Box(lower, upper):
@@ -31,6 +34,18 @@ def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
         case Tube(center, inner, outer):
             r = _radius(points, center)
             return np.maximum(inner - r, r - outer)
+        case Cylinder(start, end, outer, inner):
+            along, r = cylinder_coordinates(shape, points)
+            ends = np.maximum(-along, along - math.dist(start, end))
+            return np.maximum(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
+
+
+def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance [m] along the axis, from its start, and from the axis, of `points` (n, 3) -> (n,), (n,)."""
+    start = np.asarray(shape.start)
+    axis = (np.asarray(shape.end) - start) / math.dist(shape.start, shape.end)
+    along = (points - start) @ axis
+    return along, np.sqrt(((points - start - along[:, None] * axis) ** 2).sum(axis=1))
 
 
 def _radius(points: np.ndarray, center: tuple[float, ...]) -> np.ndarray:
@@ -49,6 +64,10 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
             return lower, upper
         case Ball(center, radius) | Tube(center, _, radius):
             return tuple(c - radius for c in center), tuple(c + radius for c in center)
+        case Cylinder(start, end, radius):
+            axis = (np.asarray(end) - np.asarray(start)) / math.dist(start, end)
+            reach = radius * np.sqrt(np.maximum(1.0 - axis**2, 0.0))  # of its round faces
+            return tuple(np.minimum(start, end) - reach), tuple(np.maximum(start, end) + reach)
         case HalfSpace(point, normal):
             lower, upper = [-math.inf] * len(point), [math.inf] * len(point)
             axes = [d for d, n in enumerate(normal) if n != 0.0]
@@ -58,7 +77,7 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
             return tuple(lower), tuple(upper)
 
 
-def volume(shape: Box | Ball | Tube) -> float:
+def volume(shape: Box | Ball | Tube | Cylinder) -> float:
     """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
@@ -68,6 +87,8 @@ def volume(shape: Box | Ball | Tube) -> float:
             return ball[len(center) - 1] * radius ** len(center)
         case Tube(center, inner, outer):
             return ball[len(center) - 1] * (outer ** len(center) - inner ** len(center))
+        case Cylinder(start, end, outer, inner):
+            return math.pi * (outer**2 - inner**2) * math.dist(start, end)
 
 
 def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple[float, ...]) -> np.ndarray:

@@ -10,7 +10,17 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.scene.description import Body, Domain, Fluid, FluidState, LinearEos, NoStrength, Scene
+from distfsi.scene.description import (
+    Body,
+    Compaction,
+    Domain,
+    Fluid,
+    FluidState,
+    LinearEos,
+    MieGrueneisen,
+    NoStrength,
+    Scene,
+)
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
 
@@ -181,7 +191,13 @@ def _inverse_sum(domain: Domain) -> float:
 
 def solid_sound(body: Body) -> float:
     """Longitudinal sound speed [m/s] of a body at rest."""
-    bulk = body.eos.bulk_modulus if isinstance(body.eos, LinearEos) else body.density * body.eos.c0**2
+    match body.eos:
+        case LinearEos(bulk_modulus):
+            bulk = bulk_modulus
+        case Compaction(crush_pressure, crush_strain):
+            bulk = crush_pressure / crush_strain
+        case MieGrueneisen(c0):
+            bulk = body.density * c0**2
     shear = 0.0 if isinstance(body.strength, NoStrength) else body.strength.shear_modulus
     return math.sqrt((bulk + 4.0 / 3.0 * shear) / body.density)
 
@@ -195,7 +211,7 @@ def solid_rate(scene: Scene, body: Body) -> float:
     closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
     u = 0.5 * max(closing)
     compression = 1.0
-    if u > 0.0 and not isinstance(body.eos, LinearEos):
+    if u > 0.0 and isinstance(body.eos, MieGrueneisen):
         compression = 1.0 - u / (body.eos.c0 + body.eos.s1 * u)
         c += (2.0 * body.eos.s1 - 1.0) * u
     h = solid.smoothing * body.spacing * max(compression, 0.1) ** (1.0 / scene.domain.dimensions)

@@ -28,7 +28,9 @@ class Mirror(Table):
 
     def build(self) -> Any:
         """The instance of the described class."""
-        return self.describes(**{name: getattr(self, name) for name in type(self).model_fields if name != self.word})
+        values = {name: getattr(self, name) for name in type(self).model_fields if name != self.word}
+        built = {name: value.build() if isinstance(value, Mirror) else value for name, value in values.items()}
+        return self.describes(**built)
 
 
 def quantity(unit: str, **limits: float) -> Any:
