@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import importlib.util
-import os
 import sys
 import threading
 import time as clock
@@ -15,17 +13,10 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 from distfsi.device import emit, runtime
+from distfsi.device.cache import cache_directory, locked, write_whole
 from distfsi.device.fold import Bound, NotInSubset
 
 __all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
-
-
-def cache_directory() -> Path:
-    """Where compiled modules live: $DISTFSI_CACHE, else the user's cache folder."""
-    root = os.environ.get("DISTFSI_CACHE")
-    if root is None:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
-    return Path(root)
 
 
 def build(
@@ -51,13 +42,9 @@ def _load(name: str, text: str) -> ModuleType:
     full_name = f"distfsi_kernels.{name}"
     if full_name in sys.modules:
         return sys.modules[full_name]
-    directory = cache_directory()
-    directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{name}.py"
+    path = cache_directory() / f"{name}.py"
     if not path.exists():
-        unfinished = path.with_suffix(f".{os.getpid()}")
-        unfinished.write_text(text)
-        os.replace(unfinished, path)
+        write_whole(path, text.encode())
     spec = importlib.util.spec_from_file_location(full_name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[full_name] = module
@@ -79,8 +66,7 @@ class _Compiled:
     def _first_call(self, *arguments):
         with self._lock:
             if self._call is not self.dispatcher:
-                with open(self.path.with_suffix(".lock"), "w") as lock:
-                    fcntl.flock(lock, fcntl.LOCK_EX)
+                with locked(self.path):
                     result = self.dispatcher(*arguments)
                 self._call = self.dispatcher
                 return result

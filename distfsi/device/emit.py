@@ -1,14 +1,14 @@
 """Emission: drivers and all the formulas they reach -> the text of one module, specialised for a scene.
 
 The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be
-stale. CUDA C will be a second writer beside `numba_text`, of the same folded functions.
+stale. `device/cuda_text.py` is a second writer of the same folded functions.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -96,7 +96,7 @@ def numba_text(
     emission = Emission(constants, bindings)
     root = emission.add(driver, {})
     literals, parts = _TypedLiterals(), []
-    for source, tree in _callees_first(emission.functions):
+    for source, tree in callees_first(emission.functions):
         text = ast.unparse(ast.fix_missing_locations(literals.visit(tree)))
         kind = "driver" if tree.name == root and source.kind == "formula" else source.kind
         parts.append(f"# {source.place}\n@{kind}\n{text}")
@@ -120,8 +120,10 @@ def _number(text: str) -> str:
     return {"inf": "np.inf", "-inf": "-np.inf", "nan": "np.nan"}.get(text, text)
 
 
-def _callees_first(functions: Mapping[str, tuple[Source, ast.FunctionDef]]) -> list[tuple[Source, ast.FunctionDef]]:
-    """Only the functions still called after folding, each after those it calls."""
+def callees_first(
+    functions: Mapping[str, tuple[Source, ast.FunctionDef]], roots: Iterable[str] | None = None
+) -> list[tuple[Source, ast.FunctionDef]]:
+    """Only what the `roots`, by default the last of the functions, still call after folding: callees first."""
     ordered: dict[str, tuple[Source, ast.FunctionDef]] = {}
 
     def place(name: str) -> None:
@@ -132,7 +134,8 @@ def _callees_first(functions: Mapping[str, tuple[Source, ast.FunctionDef]]) -> l
                 place(node.func.id)
         ordered[name] = functions[name]
 
-    place(next(reversed(functions)))
+    for root in roots or [next(reversed(functions))]:
+        place(root)
     return list(ordered.values())
 
 
@@ -151,6 +154,6 @@ def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping
     words = {"sqrt": np.sqrt, "exp": np.exp, "log": np.log, "pow": np.power, "floor": np.floor, "workspace": np.empty}
     namespace = {**words, "load": markers.load, "store": markers.store, "real": float}
     namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
-    for _, tree in _callees_first(emission.functions):
+    for _, tree in callees_first(emission.functions):
         exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)
     return namespace[name]

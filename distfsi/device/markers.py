@@ -4,7 +4,29 @@ The words have plain Python meanings here, so that a kernel can be read, linted 
 `device/cpu.py` gives them their fast meanings.
 """
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
 import numpy as np
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """A kernel whose loops are written in CUDA C, because they are not those of the CPU: one block of threads per item.
+
+    file      beside the driver's module; it holds `NAME_kernel(PARAMETERS)`
+    formulas  the names of formulas that it calls
+    block     (constants, arguments by name) -> the integers it is compiled with; among them THREADS of a block and
+              SHARED, the reals in a block's shared memory
+    """
+
+    file: str
+    formulas: Sequence[str]
+    block: Callable[[dict, dict], dict[str, int]]
+
+    def __call__(self, driver):
+        driver.__by_hand__ = self
+        return driver
 
 
 def row(function):

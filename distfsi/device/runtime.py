@@ -7,18 +7,15 @@ checks stay valid and results do not depend on how a loop was vectorised.
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-
-import numpy as np
 from llvmlite import ir
 from numba import literal_unroll, njit, types
 from numba.core.options import TargetOptions
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
+from distfsi.device.exponential import EXPONENTIALS, Exponential
+
 VERSION = "3"
-LN_2 = "0.693147180559945309417232121458176568075500134360255"
 
 _OPTIONS = cpu_target.options
 if not hasattr(_OPTIONS, "noalias"):
@@ -81,17 +78,11 @@ def _two_to_the(typing_context, shifted):
     return shifted(shifted), code
 
 
-def _exponential(real: type, mantissa: int, degree: int, lowest: float, highest: float, split: int):
-    """exp(x) by x = n ln 2 + r and a polynomial in r, in arithmetic that vectorises (libm's does not).
-
-    It has the same bits on every device. Below `lowest` and above `highest` it stays at the value there. `split`: bits
-    of ln 2 in its first part.
-    """
-    shift, per_two = real(1.5 * 2.0**mantissa), real(1.0 / math.log(2.0))
-    high = real(math.floor(math.log(2.0) * 2.0**split) / 2.0**split)
-    low = real(Fraction(LN_2) - Fraction(float(high)))
-    lowest, highest, one = real(lowest), real(highest), real(1.0)
-    coefficients = tuple(real(1.0 / math.factorial(k)) for k in range(degree, -1, -1))
+def _exponential(numbers: Exponential):
+    """The exponential in arithmetic that vectorises (device/exponential.py)."""
+    lowest, highest, shift, per_two = numbers.lowest, numbers.highest, numbers.shift, numbers.per_two
+    high, low, coefficients = numbers.high, numbers.low, numbers.coefficients
+    one = type(high)(1.0)
 
     @formula
     def exponential(x):
@@ -108,5 +99,5 @@ def _exponential(real: type, mantissa: int, degree: int, lowest: float, highest:
     return exponential
 
 
-exp_float64 = _exponential(np.float64, 52, 13, -708.0, 709.0, 32)
-exp_float32 = _exponential(np.float32, 23, 7, -87.0, 88.0, 12)
+exp_float64 = _exponential(EXPONENTIALS["float64"])
+exp_float32 = _exponential(EXPONENTIALS["float32"])

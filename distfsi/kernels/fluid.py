@@ -12,7 +12,7 @@ P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes h
 have their velocity components rotated so that the normal one comes first.
 """
 
-from distfsi.device.markers import driver, helper, load, row, store, workspace
+from distfsi.device.markers import ByHand, driver, helper, load, row, store, workspace
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
@@ -187,6 +187,17 @@ def book(through, t, side, F, f, step, st, axis, n, rows, weight):
             through[t, side, v] += total * weight
 
 
+def stage_block(constants, arguments):
+    """A thread per column of a tile; shared memory holds primitives of the tile, in 3D of four planes, and fluxes."""
+    D = constants["DIMENSIONS"]
+    px, py = int(arguments["px"]), int(arguments["py"])
+    x, y = px - 4, py - (4 if D > 1 else 0)
+    cells, faces = px * py * (4 if D > 2 else 1), (x + 1) * (y + (1 if D > 1 else 0))
+    shared = constants["VARIABLES"] * cells + constants["FLUXES"] * faces
+    return {"TILE_X": x, "TILE_Y": y, "THREADS": x * y, "SHARED": shared}
+
+
+@ByHand("fluid.cu", ("primitives", "limited_slope", "face_flux", "updated"), stage_block)
 @driver
 def advance_tiles(
     begin, end, chosen, tiles, calm, stages, U_n, U, U_new, through, b, dt, weight, cx, cy, cz, px, py, pz
@@ -293,6 +304,12 @@ def signal_row(U, S, u, su, n, rx, ry, rz):
         store(S, n + i, load(S, n + i) + (signal - signal))
 
 
+def signal_block(constants, arguments):
+    """The block's threads share the cells of a block of the grid."""
+    return {"THREADS": 128, "SHARED": 0}
+
+
+@ByHand("fluid.cu", ("primitives", "sound_speed"), signal_block)
 @driver
 def fastest_signals(begin, end, chosen, U, start, extent, rx, ry, rz, fastest):
     """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s] for the blocks chosen[begin:end]; NaN when a

@@ -1,0 +1,287 @@
+// The loops of kernels/fluid.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
+//
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
+
+// ---- tuples and arrays ------------------------------------------------------------------------------------------------
+
+template <class... R> DEVICE Tuple<real, R...> joined(real first, Tuple<R...> rest) { return {first, rest}; }
+
+// The N values from `values` on, `step` apart.
+template <int N, int K = 0> DEVICE auto tuple_of(const real *values, int step = 1)
+{
+    if constexpr (K == N)
+        return Tuple<>{};
+    else
+        return joined(values[K * step], tuple_of<N, K + 1>(values, step));
+}
+
+DEVICE void put(Tuple<>, real *, long long) {}
+
+template <class... R> DEVICE void put(Tuple<real, R...> tuple, real *values, long long step)
+{
+    *values = tuple.head;
+    put(tuple.tail, values + step, step);
+}
+
+DEVICE constexpr bool is_velocity(int v) { return v >= PHASES && v < PHASES + DIMENSIONS; }
+
+// The variable that stands at place v when the velocity along `axis` comes first, and where variable v stands then.
+DEVICE constexpr int rotated(int v, int axis)
+{
+    return is_velocity(v) ? PHASES + (v - PHASES + axis) % DIMENSIONS : v;
+}
+DEVICE constexpr int place(int v, int axis)
+{
+    return is_velocity(v) ? PHASES + (v - PHASES + DIMENSIONS - axis) % DIMENSIONS : v;
+}
+
+#ifdef HAS_TILE_X
+
+// ---- a tile in shared memory ------------------------------------------------------------------------------------------
+
+constexpr int GY = DIMENSIONS > 1 ? 2 : 0, GZ = DIMENSIONS > 2 ? 2 : 0;
+constexpr int PX = TILE_X + 4, PY = TILE_Y + 2 * GY, PLANE = PX * PY;
+constexpr int SLOTS = DIMENSIONS > 2 ? 4 : 1;  // planes of cells that are kept: a flux along z reads four
+constexpr int SP = SLOTS * PLANE;
+constexpr int ROW = TILE_X + 1;  // of faces
+constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
+constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
+static_assert(SHARED == VARIABLES * SP + FLUXES * FACES && THREADS == TILE_X * TILE_Y, "what the launch assumes");
+
+// P of a cell of the tile; k counts planes, of which the last SLOTS are there.
+DEVICE int cell(int i, int j, int k) { return (SLOTS > 1 ? (k + 4) % SLOTS : 0) * PLANE + (j + GY) * PX + i + 2; }
+
+template <int AXIS> DEVICE int cell_along(int i, int j, int k, int steps)
+{
+    return cell(AXIS == 0 ? i + steps : i, AXIS == 1 ? j + steps : j, AXIS == 2 ? k + steps : k);
+}
+
+template <int AXIS> DEVICE real largest_jump(const real *p, int i, int j, int k)
+{
+    const real here = p[cell(i, j, k)];
+    return maximum(magnitude(p[cell_along<AXIS>(i, j, k, 1)] - here), magnitude(here - p[cell_along<AXIS>(i, j, k, -1)]));
+}
+
+// The largest pressure difference between the face's two cells and those beside them.
+template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int k)
+{
+    constexpr int FIRST = AXIS == 0 ? 1 : 0, SECOND = AXIS == 2 ? 1 : 2;
+    const int ni = i + (AXIS == 0), nj = j + (AXIS == 1), nk = k + (AXIS == 2);
+    real jump = maximum(largest_jump<FIRST>(p, i, j, k), largest_jump<FIRST>(p, ni, nj, nk));
+    if constexpr (DIMENSIONS > 2)
+        jump = maximum(jump, maximum(largest_jump<SECOND>(p, i, j, k), largest_jump<SECOND>(p, ni, nj, nk)));
+    return jump;
+}
+
+// Flux through the face between a cell and the next along AXIS; its velocity components are rotated.
+template <int AXIS> DEVICE void flux(const real *P, int i, int j, int k, real *F, int step)
+{
+    real left[VARIABLES], right[VARIABLES];
+    const int before = cell_along<AXIS>(i, j, k, -1), low = cell(i, j, k);
+    const int high = cell_along<AXIS>(i, j, k, 1), after = cell_along<AXIS>(i, j, k, 2);
+#pragma unroll
+    for (int v = 0; v < VARIABLES; v++) {
+        const real *W = P + rotated(v, AXIS) * SP;
+        const real difference = W[high] - W[low];
+        left[v] = W[low] + HALF * limited_slope(W[low] - W[before], difference);
+        right[v] = W[high] - HALF * limited_slope(difference, W[after] - W[high]);
+    }
+    real jump = 0;
+    if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
+    put(face_flux(tuple_of<VARIABLES>(left), tuple_of<VARIABLES>(right), jump), F, step);
+}
+
+// P = primitives of plane k of the cells at U, with n x m cells and their ghosts.
+DEVICE void load_plane(const real *U, real *P, int k, int n, int m, int tx, int ty, long long sy, long long sz, long long su)
+{
+    for (int j = ty - GY; j < m + GY; j += TILE_Y) {
+        for (int i = tx - 2; i < n + 2; i += TILE_X) {
+            const real *u = U + k * sz + j * sy + i;
+            real state[VARIABLES];
+#pragma unroll
+            for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
+            put(primitives(tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
+        }
+    }
+}
+
+// Whether a box of n x m x l cells at U holds one state: a part of the answer, for the cells of this thread.
+DEVICE bool is_unlike(const real *U, const real *first, int n, int m, int l, int tx, int ty, long long sy, long long sz,
+                      long long su)
+{
+    for (int v = 0; v < VARIABLES; v++) {
+        const real value = first[v * su];
+        for (int k = 0; k < l; k++)
+            for (int j = ty; j < m; j += TILE_Y)
+                for (int i = tx; i < n; i += TILE_X)
+                    if (U[v * su + k * sz + j * sy + i] != value) return true;
+    }
+    return false;
+}
+
+// Add the flux through n faces of a domain side, `step` apart, to what has left through it; and that of as many `rows`
+// as are alike. Always in the same order.
+DEVICE void book(double *through, const real *F, int axis, int step, int n, int rows, double weight)
+{
+    for (int v = threadIdx.x; v < CONSERVED; v += THREADS) {
+        const real *values = F + place(v, axis) * FACES;
+        real total = values[0];
+        for (int i = 1; i < n; i++) total = total + values[i * step];
+        for (int row = 0; row < rows; row++) through[v] += total * weight;
+    }
+}
+
+// columns of the tile table
+enum { BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES };
+
+extern "C" __global__ void __launch_bounds__(THREADS) advance_tiles_kernel(PARAMETERS)
+{
+    DYNAMIC_SHARED(shared);
+    real *P = (real *)shared, *F = P + VARIABLES * SP;
+    const int tx = threadIdx.x % TILE_X, ty = threadIdx.x / TILE_X;
+    const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
+    for (long long at = begin + blockIdx.x; at < end; at += gridDim.x) {
+        const long long t = chosen[at], *tile = tiles + t * tiles_1;
+        const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
+        const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
+        const bool is_calm = calm[t];
+        bool uniform = is_calm;
+        if (!is_calm) {
+            const real *corner = U + u0 - GZ * sz - GY * sy - 2;
+            const bool unlike = is_unlike(corner, corner, nx + 4, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
+                                || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
+            uniform = __syncthreads_count(unlike) == 0;
+        }
+        const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
+        const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
+        const bool inside = tx < n && ty < m;
+        double *out = through + t * 6 * CONSERVED;
+        real low[FLUXES], high[FLUXES], D[FLUXES];
+
+        for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
+        __syncthreads();
+        if constexpr (DIMENSIONS > 2) {
+            if (inside) flux<2>(P, tx, ty, -1, low, 1);
+            if (sides & 16) {
+                if (inside)
+                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v];
+                __syncthreads();
+                for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+            }
+            __syncthreads();
+        }
+        for (int k = 0; k < l; k++) {
+            if constexpr (DIMENSIONS > 2) {
+                load_plane(U + u0, P, k + 2, n, m, tx, ty, sy, sz, su);
+                __syncthreads();
+            }
+            if (ty < m)
+                for (int i = tx; i < n + 1; i += TILE_X) flux<0>(P, i - 1, ty, k, F + ty * ROW + i, FACES);
+            __syncthreads();
+            if (inside) {
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) {
+                    const real *f = F + v * FACES + ty * ROW + tx;
+                    D[v] = (f[1] - f[0]) * cx;
+                }
+            }
+            for (int j = 0; j < m; j++) {
+                if (sides & 1) book(out, F + j * ROW, 0, step, 1, x_alike, weight * cx);
+                if (sides & 2) book(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, weight * cx);
+            }
+            if constexpr (DIMENSIONS > 1) {
+                __syncthreads();
+                if (tx < n)
+                    for (int j = ty; j < m + 1; j += TILE_Y) flux<1>(P, tx, j - 1, k, F + j * ROW + tx, FACES);
+                __syncthreads();
+                if (inside) {
+#pragma unroll
+                    for (int v = 0; v < FLUXES; v++) {
+                        const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
+                        D[v] = D[v] + (f[ROW] - f[0]) * cy;
+                    }
+                }
+                if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
+                if (sides & 8) book(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, weight * cy);
+            }
+            if constexpr (DIMENSIONS > 2) {
+                if (inside) {
+                    flux<2>(P, tx, ty, k, high, 1);
+#pragma unroll
+                    for (int v = 0; v < FLUXES; v++) D[v] = D[v] + (high[place(v, 2)] - low[place(v, 2)]) * cz;
+#pragma unroll
+                    for (int v = 0; v < FLUXES; v++) low[v] = high[v];
+                }
+                if ((sides & 32) && k == l - 1) {
+                    __syncthreads();
+                    if (inside)
+                        for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v];
+                    __syncthreads();
+                    for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+                }
+            }
+            if (inside) {
+                const long long u = u0 + k * sz + ty * sy + tx;
+                real before[VARIABLES], now[VARIABLES];
+#pragma unroll
+                for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
+                const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
+                const auto divergence = tuple_of<FLUXES>(D);
+                put(updated(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt), U_new + u, su);
+            }
+            __syncthreads();
+        }
+        bool unchanged = uniform;
+        for (int v = 0; v < VARIABLES && uniform; v++) {
+            const real value = U_new[u0 + v * su];
+            unchanged = unchanged && U[u0 + v * su] == value && U_n[u0 + v * su] == value;
+            for (int k = 0; k < nz && !is_calm; k++)
+                for (int j = ty; j < ny; j += TILE_Y)
+                    for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
+        }
+        if (threadIdx.x == 0) stages[t] = unchanged ? stages[t] + 1 : 0;
+    }
+}
+
+#else
+
+// ---- the fastest signal -----------------------------------------------------------------------------------------------
+
+extern "C" __global__ void __launch_bounds__(THREADS) fastest_signals_kernel(PARAMETERS)
+{
+    __shared__ real largest[THREADS];
+    const real rates[3] = {rx, ry, rz};
+    const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
+    for (long long at = begin + blockIdx.x; at < end; at += gridDim.x) {
+        const long long block = chosen[at], nx = extent[3 * block], ny = extent[3 * block + 1], nz = extent[3 * block + 2];
+        const real *first = U + block * VARIABLES * su + start;
+        real most = 0, invalid = 0;
+        for (long long cell = threadIdx.x; cell < nx * ny * nz; cell += THREADS) {
+            const real *u = first + cell / (nx * ny) * sz + cell / nx % ny * sy + cell % nx;
+            real state[VARIABLES];
+#pragma unroll
+            for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
+            const auto W = primitives(tuple_of<VARIABLES>(state));
+            const real c = sound_speed(W);
+            real w[VARIABLES];
+            put(W, w, 1);
+            real signal = (magnitude(w[PHASES]) + c) * rates[0];
+            for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
+            most = maximum(most, signal);
+            invalid = invalid + (signal - signal);
+        }
+        largest[threadIdx.x] = most + invalid;
+        for (int half = THREADS / 2; half > 0; half /= 2) {
+            __syncthreads();
+            if (threadIdx.x < half) {
+                const real mine = largest[threadIdx.x], other = largest[threadIdx.x + half];
+                largest[threadIdx.x] = other <= mine || mine != mine ? mine : other;
+            }
+        }
+        if (threadIdx.x == 0) fastest[block] = largest[0];
+        __syncthreads();
+    }
+}
+
+#endif
