@@ -29,7 +29,7 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, CONCRETE, DIMENSIONS, FAILS, POLAR_ROTATION
 from distfsi.physics.tensors import trace
 
-EOS_CONSTANTS, STRENGTH_CONSTANTS, FAILURE_CONSTANTS, CONCRETE_CONSTANTS = 9, 11, 9, 19  # columns of the tables
+EOS_CONSTANTS, STRENGTH_CONSTANTS, FAILURE_CONSTANTS, CONCRETE_CONSTANTS = 9, 11, 9, 20  # columns of the tables
 COMPRESSIVE_STRENGTH = 8  # of concrete
 
 
@@ -224,7 +224,8 @@ def crush(
     sound_speed[i] = solid_sound_speed(density[i], bulk, shear_modulus, law)
 
     trial = von_mises(stress)
-    level = concrete_strength(p, rate, max(wear[i], damage[i]), stone)
+    cracked = damage[i] if p > 0.0 else 0.0  # in tension the carried share counts the crack already
+    level = concrete_strength(p, rate, max(wear[i], cracked), stone)
     increment = max(trial - level, 0.0) / (3.0 * shear_modulus)
     plastic_strain[i] += increment
     closed = compacted_strain(compression[i], stone) - before

@@ -37,7 +37,7 @@ from distfsi.scene.description import (
 )
 
 ROOM_TEMPERATURE = 293.15  # K, of materials that do not know their own
-NOT_CONCRETE = (0.0,) * 19
+NOT_CONCRETE = (0.0,) * 20
 NO_FAILURE = (math.inf, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0)
 
 
@@ -165,8 +165,8 @@ def failure_constants(failure: Failure | None, size: float) -> tuple[float, ...]
             return *NO_FAILURE[:6], tensile_strength, fracture_energy, size
 
 
-def concrete_constants(eos: Compaction, strength: Concrete) -> tuple[float, ...]:
-    """The tuple `concrete` of physics/concrete.py."""
+def concrete_constants(eos: Compaction, strength: Concrete, cracks: bool) -> tuple[float, ...]:
+    """The tuple `concrete` of physics/concrete.py; `cracks`: a failure model limits the tension."""
     dense = (0.0, 0.0, 0.0, eos.lock_strain, 0.0, eos.K1, eos.K2, eos.K3)
     full = brentq(
         lambda mu: dense_pressure(mu, dense) - eos.lock_pressure,
@@ -178,7 +178,7 @@ def concrete_constants(eos: Compaction, strength: Concrete) -> tuple[float, ...]
     return (
         *(eos.crush_pressure, eos.crush_strain, eos.lock_pressure, eos.lock_strain, full, eos.K1, eos.K2, eos.K3),
         *(s.compressive_strength, s.tensile_strength, s.A, s.B, s.N, s.C, s.cap),
-        *(s.D1, s.D2, s.least_failure_strain, s.reference_rate),
+        *(s.D1, s.D2, s.least_failure_strain, s.reference_rate, math.inf if cracks else s.tensile_strength),
     )
 
 
@@ -191,7 +191,9 @@ def _failure_row(body: Body) -> tuple[float, ...]:
 
 
 def _concrete_row(body: Body) -> tuple[float, ...]:
-    return concrete_constants(body.eos, body.strength) if isinstance(body.strength, Concrete) else NOT_CONCRETE
+    if not isinstance(body.strength, Concrete):
+        return NOT_CONCRETE
+    return concrete_constants(body.eos, body.strength, body.failure is not None)
 
 
 # ---- scatter ---------------------------------------------------------------------------------------------------------

@@ -1,9 +1,11 @@
 """Concrete of Holmquist, Johnson & Cook 1993 (paper, A.8-A.11 corrected): compaction, pressure-dependent strength.
 
 A material's `concrete` is the tuple (crush_pressure, crush_strain, lock_pressure, lock_strain, full_strain, K1, K2, K3,
-compressive_strength, tensile_strength, A, B, N, C, cap, D1, D2, least_strain, reference_rate);
+compressive_strength, tensile_strength, A, B, N, C, cap, D1, D2, least_strain, reference_rate, cut_off);
 compressive_strength = 0: not of concrete. mu = rho/rho0 - 1. The pores are closed at full_strain, where the curve of
-the dense material, which starts at lock_strain, reaches lock_pressure. `wear` in 0 ... 1 is the material's own damage.
+the dense material, which starts at lock_strain, reaches lock_pressure. No tension beyond cut_off is carried: it is
+tensile_strength, or infinite where cracks (damage.py) limit the tension instead. `wear` in 0 ... 1 is the material's
+own damage.
 """
 
 from math import log, pow
@@ -39,16 +41,16 @@ def compacted_strain(peak, concrete):
 def concrete_pressure(mu, peak, wear, concrete):
     """Pressure [Pa] at mu <= `peak`, the largest compression so far (from 0); tension to the strength that is left."""
     linear = loading_pressure(peak, concrete) + unloading_modulus(peak, concrete) * (mu - peak)
-    return max(linear, -concrete[9] * (1.0 - wear))
+    return max(linear, -concrete[19] * (1.0 - wear)) if wear < 1.0 else max(linear, 0.0)
 
 
 def concrete_strength(pressure, rate, wear, concrete):
     """Von Mises stress [Pa] at yield (A.8, A.9 with the cap); falls to zero at the largest tension."""
-    fc, T, A, B, N, C, cap = tuple(concrete[k] for k in static_range(8, 15))
+    fc, tensile_strength, A, B, N, C, cap = tuple(concrete[k] for k in static_range(8, 15))
+    cut_off = concrete[19] * (1.0 - wear) if wear < 1.0 else 0.0
     faster = 1.0 + C * log(max(rate / concrete[18], 1.0))
     cohesion = A * (1.0 - wear)
-    tension = T * (1.0 - wear)
-    pulled = cohesion * max(1.0 + pressure / max(tension, 1.0), 0.0)
+    pulled = cohesion * max(1.0 + pressure / max(cut_off, 1.0), 0.0)
     pressed = cohesion + B * pow(max(pressure, 0.0) / fc, N)
     return fc * min((pressed if pressure > 0.0 else pulled) * faster, cap)
 

@@ -19,17 +19,17 @@ def vorticity(gradient):
 
 
 def half_rotation(spin, dt):
-    """Antisymmetric matrix whose Cayley transform turns by the spin times `dt`: tan(t/2) = t/2 (1 + t^2/12 + ...)."""
+    """Antisymmetric matrix whose Cayley transform turns by the spin times `dt`; tan(x) = x (1 + x^2/3 + 2 x^4/15 ...)."""
     half = tuple(tuple(0.5 * dt * spin[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
     tangent2 = 0.5 * sum(
         sum(half[a][b] * half[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
     )
-    longer = 1.0 + tangent2 / 3.0
+    longer = 1.0 + tangent2 * (1.0 / 3.0 + tangent2 * (2.0 / 15.0))
     return tuple(tuple(longer * half[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
 
 
 def rotation(spin, dt):
-    """Orthogonal matrix that turns by the spin times `dt` (Hughes & Winget 1980, of fourth order in the angle)."""
+    """Orthogonal matrix that turns by the spin times `dt` (Hughes & Winget 1980, of sixth order in the angle)."""
     half = half_rotation(spin, dt)
     square = product(half, half)
     factor = 2.0 / (1.0 - 0.5 * trace(square))

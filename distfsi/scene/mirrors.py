@@ -252,7 +252,7 @@ class Concrete(Mirror):
     kind: Literal["concrete"]
     shear_modulus: PositivePressure = Field(description="shear modulus G")
     compressive_strength: PositivePressure = Field(description="uniaxial compressive strength f_c")
-    tensile_strength: PositivePressure = Field(description="largest hydrostatic tension T")
+    tensile_strength: PositivePressure = Field(description="largest tension T; a `failure` takes its place")
     A: quantity("1", ge=0.0) = Field(description="cohesion")
     B: quantity("1", ge=0.0) = Field(description="hardening by pressure p* = p/f_c")
     N: PositiveNumber = Field(description="its exponent")

@@ -1,0 +1,310 @@
+"""The material point as a whole: `deform` driven through strain histories, against exact and independent answers."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from distfsi.device import cpu
+from distfsi.kernels.material import deform
+from distfsi.parts.materials import Materials, concrete_constants, weibull
+from distfsi.physics import concrete, damage, strength
+from distfsi.scene import description as d
+
+STEEL = d.JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
+STEEL_EOS = d.LinearEos(160e9)
+HJC_EOS = d.Compaction(16e6, 0.001, 0.80e9, 0.10, 85e9, -171e9, 208e9)
+HJC = d.Concrete(14.86e9, 48e6, 4e6, 0.79, 1.60, 0.61, 0.007, 7.0, 0.04, 1.0, 0.01, 1.0)
+TENSION, SHEAR = np.diag([1.0, 0.0, 0.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+class Point:
+    """One or more particles of one material that are strained together."""
+
+    def __init__(self, eos, strength, density=7830.0, failure=None, spacing=1e-3, rate="jaumann", count=1, D=3):
+        shape = d.Ball((0.0,) * D, 1.0)
+        body = d.Body("body", shape, spacing, density, (0.0,) * D, eos, strength, None, failure)
+        materials = Materials(d.Solid((body,), 1.3, 1.0, 2.0, rate), D)
+        constants = {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2} | materials.constants
+        self.deform, self.tables = cpu.build((deform,), constants).deform, materials.tables
+        self.body, ids = np.zeros(count, dtype=int), np.arange(count)
+        self.columns = materials.initial(self.body, ids, np.full(count, spacing**D))
+        self.columns |= {"energy": np.zeros(count), "density": np.full(count, density), "h": np.full(count, 1e-3)}
+        self.state = materials.state(self.columns)
+        self.strain(0.0, np.zeros((D, D)))
+
+    def strain(self, dt, gradient):
+        rates = np.tile(np.ascontiguousarray(gradient, dtype=float).ravel(), (len(self.body), 1))
+        self.deform(0, len(self.body), dt, rates, self.body, *self.tables, *self.state)
+        return self
+
+    def __getattr__(self, name):
+        return self.columns[name]
+
+    @property
+    def normal_stress(self):
+        """Along x [Pa], tension positive."""
+        return self.deviator[:, 0] - self.pressure
+
+
+def von_mises(S):
+    return math.sqrt(1.5 * (S[:3] @ S[:3] + 2.0 * S[3:] @ S[3:]))
+
+
+# ---- plastic flow ----------------------------------------------------------------------------------------------------
+
+
+def test_a_cycle_of_shear_follows_the_independent_integration():
+    """Forth, back and forth again at 1e4/s: rate form of Johnson-Cook with heating, integrated by scipy."""
+    point, rate, dt = Point(STEEL_EOS, STEEL), 1e4, 2e-9
+    G, A, B, n, C, m, _, room, melt, capacity, taylor_quinney = point.tables[1][0]
+
+    def rates(time, y, sign):
+        """Of shear stress, plastic strain and temperature: the overstress says how fast it flows."""
+        tau, strain, temperature = y
+        soft = 1.0 - (max(temperature - room, 0.0) / (melt - room)) ** m
+        over = math.sqrt(3.0) * abs(tau) / ((A + B * max(strain, 0.0) ** n) * soft) - 1.0
+        flow = math.exp(min(over / C, 40.0)) if over > 0.0 else 0.0
+        heating = taylor_quinney * math.sqrt(3.0) * abs(tau) * flow / (7830.0 * capacity)
+        return [sign * G * rate - math.copysign(math.sqrt(3.0) * G * flow, tau), flow, heating]
+
+    y = [0.0, 0.0, 273.0]
+    for sign, duration in ((1.0, 4e-6), (-1.0, 6e-6), (1.0, 4e-6)):
+        for _ in range(round(duration / dt)):
+            point.strain(dt, sign * rate * 0.5 * (SHEAR + SHEAR.T))
+        tolerances = {"rtol": 1e-9, "atol": [1.0, 1e-12, 1e-9], "max_step": 1e-8}
+        y = solve_ivp(rates, (0.0, duration), y, "LSODA", args=(sign,), **tolerances).y[:, -1]
+        assert point.deviator[0, 3] == pytest.approx(y[0], rel=3e-4)
+        assert point.plastic_strain[0] == pytest.approx(y[1], rel=3e-4)
+        assert point.temperature[0] - 273.0 == pytest.approx(y[2] - 273.0, rel=3e-4)
+
+
+def test_linear_hardening_is_exact_in_uniaxial_strain():
+    G, Y, H, K = 77e9, 400e6, 3e9, 160e9
+    point, strain = Point(STEEL_EOS, d.LinearHardening(G, Y, H)), 0.02
+    for _ in range(100):
+        point.strain(1e-8, strain / 100 / 1e-8 * TENSION)
+    plastic = (2.0 * G * strain - Y) / (3.0 * G + H)
+    assert point.plastic_strain[0] == pytest.approx(plastic, rel=1e-12)
+    assert von_mises(point.deviator[0]) == pytest.approx(Y + H * plastic, rel=1e-12)
+    assert point.pressure[0] == pytest.approx(K * (math.exp(-strain) - 1.0), rel=1e-12)
+
+
+def test_a_closed_elastic_cycle_comes_back():
+    point = Point(STEEL_EOS, d.Elastic(77e9), rate="green_naghdi")
+    for sign in (1.0, -1.0):
+        for _ in range(200):
+            point.strain(1e-8, sign * 1e5 * (SHEAR + 0.3 * TENSION))
+    assert np.abs(point.deviator).max() < 1e-4 * 77e9 * 0.2
+
+
+@pytest.mark.parametrize("rate", ["jaumann", "green_naghdi"])
+def test_a_rigid_turn_of_a_strained_point_keeps_its_stress(rate):
+    point = Point(STEEL_EOS, d.Elastic(77e9), rate=rate).strain(1e-6, 1e4 * TENSION)
+    before = point.deviator.copy()
+    for _ in range(720):
+        point.strain(1.0, 2.0 * math.pi / 720 * (SHEAR - SHEAR.T))
+    assert np.allclose(point.deviator, before, rtol=0.0, atol=1e-10 * np.abs(before).max())
+
+
+# ---- failure ---------------------------------------------------------------------------------------------------------
+
+NO_RATE = {"D3": 0.0, "D4": 0.0, "D5": 0.0, "reference_rate": 1.0, "spall_strength": None, "scatter": None}
+
+
+def test_shear_fails_at_the_fracture_strain_and_not_before():
+    failure = d.JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
+    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure)
+    while point.plastic_strain[0] < 0.1999:
+        point.strain(1e-8, 1e4 * (SHEAR + SHEAR.T))
+        assert point.damage[0] == 0.0
+    assert point.wear[0] == pytest.approx(point.plastic_strain[0] / 0.2, rel=1e-12)
+    while point.plastic_strain[0] < 0.2:
+        point.strain(1e-8, 1e4 * (SHEAR + SHEAR.T))
+    assert point.damage[0] == 1.0
+    assert np.all(point.deviator == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("triaxiality", "rate", "temperature", "strain"),
+    [  # 4340 steel, Johnson & Cook 1985
+        (0.0, 1.0, 273.0, 3.49),
+        (1.0 / 3.0, 1.0, 273.0, 0.05 + 3.44 * math.exp(-2.12 / 3.0)),
+        (1.5, 1e4, 1033.0, (0.05 + 3.44 * math.exp(-3.18)) * (1.0 + 0.002 * math.log(1e4)) * 1.305),
+        (9.0, 1.0, 273.0, 0.05 + 3.44 * math.exp(-3.18)),
+    ],
+)
+def test_johnson_cook_fracture_strain(triaxiality, rate, temperature, strain):
+    compiled = cpu.build((damage.failure_strain, strength.homologous_temperature), {"DIMENSIONS": 3, "COMPONENTS": 6})
+    steel = (77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
+    heat = compiled.homologous_temperature(temperature, steel)
+    failure = (0.05, 3.44, -2.12, 0.002, 0.61, 1.0, math.inf, 0.0, 1e-3)
+    assert compiled.failure_strain(triaxiality, rate, heat, failure) == pytest.approx(strain, rel=1e-12)
+
+
+def test_crushing_uses_nothing_up():
+    failure = d.JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
+    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure)
+    for _ in range(1000):
+        point.strain(1e-8, -2e4 * TENSION)
+    assert point.plastic_strain[0] > 0.1
+    assert (point.wear[0], point.damage[0]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("spacing", [0.25e-3, 0.5e-3, 1e-3])
+def test_a_crack_takes_its_energy_at_any_spacing(spacing):
+    """Ductile in shear: work on a particle after the fracture strain, times its size, is the fracture energy."""
+    energy, dt, rate = 2e4, 2e-9, 1e4
+    failure = d.JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
+    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing)
+    work = 0.0
+    while point.damage[0] < 1.0:
+        before, worn = point.deviator[0, 3], point.wear[0] == 1.0
+        point.strain(dt, rate * 0.5 * (SHEAR + SHEAR.T))
+        work += worn * 0.5 * (before + point.deviator[0, 3]) * rate * dt
+    assert work * spacing == pytest.approx(energy, rel=0.01)
+
+
+@pytest.mark.parametrize("spacing", [0.5e-3, 1e-3, 2e-3])
+def test_a_brittle_crack_takes_its_energy_at_any_spacing(spacing):
+    K, G, strength, energy = 16e9, 12e9, 4e6, 20.0
+    failure = d.PrincipalStress(strength, energy, None)
+    point, dt, work, peak = Point(d.LinearEos(K), d.Elastic(G), failure=failure, spacing=spacing), 1.0, 0.0, 0.0
+    while point.damage[0] < 1.0:
+        before = point.normal_stress[0]
+        point.strain(dt, 2e-7 * TENSION)
+        work += 0.5 * (before + point.normal_stress[0]) * 2e-7
+        peak = max(peak, point.normal_stress[0])
+    assert peak == pytest.approx(strength, rel=5e-3)
+    assert work * spacing == pytest.approx(energy, rel=0.01)
+
+
+def test_a_failed_particle_carries_pressure_only():
+    point = Point(STEEL_EOS, d.Elastic(77e9), failure=d.PrincipalStress(1e9, 0.0, None))
+    while point.damage[0] < 1.0:
+        point.strain(1e-8, 1e4 * TENSION)
+    for _ in range(20):
+        point.strain(1e-8, 1e4 * (TENSION + SHEAR))
+    assert np.abs(point.deviator).max() == np.abs(point.pressure).max() == 0.0
+    for _ in range(400):
+        point.strain(1e-8, -1e4 * TENSION)
+    assert point.pressure[0] > 1e9
+    assert np.all(point.deviator == 0.0)
+
+
+@pytest.mark.parametrize("D", [1, 2, 3])
+def test_the_largest_principal_value_of_a_deviator(D):
+    largest = cpu.build(
+        (damage.largest_principal,), {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2}
+    ).largest_principal
+    random = np.random.default_rng(5)
+    for case in range(300):
+        values = random.normal(size=3)
+        values[2] = values[1] if case % 3 == 0 else values[2]  # double roots at either end
+        S = np.diag(values * (-1.0) ** case)
+        turn, _ = np.linalg.qr(random.normal(size=(D, D)))
+        S[:D, :D] = turn @ S[:D, :D] @ turn.T if D > 1 else S[:D, :D]
+        S -= np.trace(S) / 3.0 * np.eye(3)
+        if D == 1:
+            S = np.diag([S[0, 0], -0.5 * S[0, 0], -0.5 * S[0, 0]])
+        packed = [S[a, a] for a in range(D)] + [S[a, b] for a in range(D) for b in range(a + 1, D)]
+        assert largest(tuple(packed)) == pytest.approx(np.linalg.eigvalsh(S).max(), rel=1e-6, abs=1e-9)
+
+
+# ---- scatter ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("modulus", [2.0, 10.0])
+def test_scatter_is_weibulls_and_the_weakest_link_of_a_volume_does_not_know_the_spacing(modulus):
+    scatter = d.Scatter(modulus, 2e-3, 3)
+    fine = weibull(scatter, np.arange(64 * 4000), np.full(64 * 4000, 0.5e-3**3), 3)
+    coarse = weibull(scatter, np.arange(4000), np.full(4000, 2e-3**3), 3)
+    weakest = fine.reshape(4000, 64).min(axis=1)
+    assert coarse.mean() == pytest.approx(1.0, rel=4.0 / modulus / math.sqrt(4000))
+    assert weakest.mean() == pytest.approx(1.0, rel=4.0 / modulus / math.sqrt(4000))
+    exact = math.sqrt(math.gamma(1.0 + 2.0 / modulus) / math.gamma(1.0 + 1.0 / modulus) ** 2 - 1.0)
+    assert coarse.std() == pytest.approx(exact, rel=0.05)
+    assert weakest.std() == pytest.approx(exact, rel=0.05)
+
+
+def test_scatter_depends_on_seed_and_id_alone():
+    ids, volume = np.array([7, 3, 100000]), np.full(3, 1e-9)
+    one = weibull(d.Scatter(5.0, 1e-3, 1), ids, volume, 3)
+    assert np.array_equal(one[::-1], weibull(d.Scatter(5.0, 1e-3, 1), ids[::-1], volume, 3))
+    assert not np.any(one == weibull(d.Scatter(5.0, 1e-3, 2), ids, volume, 3))
+
+
+# ---- concrete --------------------------------------------------------------------------------------------------------
+
+
+def hydrostat(point, mu, steps=400):
+    """Compress evenly to density rho0 (1 + mu)."""
+    start = point.density[0]
+    rate = math.log(start / (2440.0 * (1.0 + mu))) / 3.0 / steps
+    for _ in range(steps):
+        point.strain(1.0, rate * np.eye(3))
+    return point.pressure[0]
+
+
+def test_concrete_is_crushed_and_locked():
+    point = Point(HJC_EOS, HJC, density=2440.0)
+    assert hydrostat(point, 0.001) == pytest.approx(16e6, rel=1e-9)
+    x = np.roots([208e9, -171e9, 85e9, -0.8e9])
+    full = 0.10 + 1.10 * float(x[np.argmin(np.abs(x))].real)
+    assert hydrostat(point, full) == pytest.approx(0.8e9, rel=1e-9)
+    assert hydrostat(point, 0.15) == pytest.approx(
+        sum(k * (0.05 / 1.1) ** n for n, k in enumerate((85e9, -171e9, 208e9), 1)), rel=1e-9
+    )
+
+
+def test_crushed_concrete_unloads_along_a_stiffer_line():
+    point = Point(HJC_EOS, HJC, density=2440.0)
+    loaded = hydrostat(point, 0.05)
+    unloaded = hydrostat(point, 0.049)
+    full = 0.10 + 1.10 * 0.0096
+    share = 0.049 / (full - 0.001)
+    assert (loaded - unloaded) / 0.001 == pytest.approx((1.0 - share) * 16e9 + share * 85e9, rel=1e-2)
+    assert hydrostat(point, 0.05) == pytest.approx(loaded, rel=1e-9)
+
+
+def test_strength_of_concrete():
+    stone = concrete_constants(HJC_EOS, HJC, cracks=False)
+    strength = cpu.build((concrete.concrete_strength,), {}).concrete_strength
+    assert strength(0.0, 1.0, 0.0, stone) == pytest.approx(0.79 * 48e6)
+    assert strength(48e6, 1.0, 0.0, stone) == pytest.approx((0.79 + 1.6) * 48e6)
+    assert strength(48e6, 1e3, 0.0, stone) == pytest.approx((0.79 + 1.6) * (1.0 + 0.007 * math.log(1e3)) * 48e6)
+    assert strength(48e6, 1.0, 1.0, stone) == pytest.approx(1.6 * 48e6)
+    assert strength(5e9, 1.0, 0.0, stone) == pytest.approx(7.0 * 48e6)
+    assert strength(-2e6, 1.0, 0.0, stone) == pytest.approx(0.5 * 0.79 * 48e6)
+    assert strength(-4e6, 1.0, 0.0, stone) == strength(-1e6, 1.0, 1.0, stone) == 0.0
+
+
+def test_shear_wears_concrete_out_and_leaves_friction():
+    """Held at a pressure, the wear grows by equal steps to 1: at a strain of 0.04 (p* + T*)."""
+    point = Point(HJC_EOS, HJC, density=2440.0)
+    pressure = hydrostat(point, 0.0008)
+    worn = 0.04 * (pressure + 4e6) / 48e6
+    start = point.plastic_strain[0]
+    while point.wear[0] < 1.0:
+        point.strain(1.0, 1e-5 * (SHEAR + SHEAR.T))
+        point.density[:] = 2440.0 * 1.0008
+    assert point.plastic_strain[0] - start == pytest.approx(max(worn, 0.01), rel=0.01)
+    point.strain(1.0, 1e-5 * (SHEAR + SHEAR.T))
+    friction = 1.6 * (pressure / 48e6) ** 0.61 * 48e6
+    assert von_mises(point.deviator[0]) == pytest.approx(friction, rel=0.01)
+
+
+def test_concrete_cracks_in_tension_and_carries_again_when_the_crack_is_closed():
+    failure = d.PrincipalStress(3.6e6, 80.0, None)
+    point, peak = Point(HJC_EOS, HJC, 2440.0, failure, spacing=5e-3), 0.0
+    while point.damage[0] < 1.0:
+        point.strain(1.0, 2e-6 * TENSION)
+        peak = max(peak, point.normal_stress[0])
+    assert peak == pytest.approx(3.6e6, rel=0.01)
+    assert 2440.0 / point.density[0] - 1.0 == pytest.approx(2.0 * 80.0 / (3.6e6 * 5e-3), rel=0.07)
+    assert abs(point.normal_stress[0]) < 1.0
+    for _ in range(5000):
+        point.strain(1.0, -2e-6 * TENSION)
+    assert point.pressure[0] > 5e6
+    assert von_mises(point.deviator[0]) > 5e6
