@@ -155,7 +155,7 @@ class Solid:
         mean = 0.5 * (c["velocity"] + velocity)
         self.work = self._per_block((impulse * mean).sum(axis=1, keepdims=True))[:, 0]
         self.given = self._per_block_and_body(impulse)
-        held = -fixed * (received + weight + impulse)  # impulse of what moves the fixed particles
+        held = -(fixed * (received + weight + impulse))  # impulse of what moves the fixed particles
         self._gravity_work += self._per_block((weight * mean + held * velocity).sum(axis=1, keepdims=True))[:, 0]
         self._boundary_impulse += self._per_block(received + weight + held)
 

@@ -19,7 +19,7 @@ def vorticity(gradient):
 
 
 def half_rotation(spin, dt):
-    """Antisymmetric matrix whose Cayley transform turns by the spin times `dt`; tan(x) = x (1 + x^2/3 + 2 x^4/15 ...)."""
+    """Antisymmetric matrix whose Cayley transform turns by the spin times `dt`: tan(x) by its series."""
     half = tuple(tuple(0.5 * dt * spin[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
     tangent2 = 0.5 * sum(
         sum(half[a][b] * half[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
