@@ -21,6 +21,7 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "undex_2d",
     "shock_bubble",
     "shock_bubble_speed",
+    "exact cases",
     "frontier fluid",
     "stability fluid",
 )

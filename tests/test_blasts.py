@@ -1,23 +1,17 @@
 """Blasts and implosions against the exact solutions of Sedov and Noh, in one, two and three dimensions."""
 
-import numpy as np
 import pytest
 
 from distfsi.scene.description import FluidState, IdealGas, Region
+from distfsi.study.exact_cases import half_way, radial_mean
 from fluids import AIR
-from tubes import advance, fields, radial_mean, radii, scene_of, start
+from tubes import advance, fields, radii, scene_of, start
 
 MONATOMIC = IdealGas(5.0 / 3.0)
 QUADRANT = ("symmetry", "outflow")
 SHARP = {"reconstruction": "van_leer", "riemann": "adaptive"}
 
 full = pytest.mark.full
-
-
-def half_way(r, values, level):
-    """Where `values`, linear between points, last fall below a level."""
-    last = np.flatnonzero(values > level)[-1]
-    return r[last] + (r[1] - r[0]) * (values[last] - level) / (values[last] - values[last + 1])
 
 
 # E and the shock's radius at time 1 in air of density 1 (Kamm and Timmes; in one dimension for both sides), and the

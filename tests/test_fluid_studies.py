@@ -10,7 +10,7 @@ from distfsi.__main__ import main
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.scatter import Point, draw_scatter
 from distfsi.scene.description import StiffenedGas
-from distfsi.study import choices, frontier_fluid, stability_fluid
+from distfsi.study import choices, exact_cases, frontier_fluid, stability_fluid
 from distfsi.study.exact import PureState
 from distfsi.study.problems import EXPLOSION, PROBLEMS, SOD
 from distfsi.study.radial import cylindrical_explosion
@@ -117,6 +117,16 @@ def test_stability(tmp_path, monkeypatch):
     assert all(row["verdict"] != "failed" for row in rows if float(row["CFL number"]) <= 0.9)
     for shown in stability_fluid.MAPS:
         assert (tmp_path / f"{shown.name}.png").exists()
+
+
+def test_exact_cases(capsys):
+    """The quick size: a line for each case, the shock in Sod's tube within a cell, none broken up but HLLC's."""
+    exact_cases.quick(Communicator(), [])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 + len(exact_cases.TUBES) + len(exact_cases.BLASTS) + 4
+    assert abs(float(lines[2].split()[1])) < 1.0
+    adaptive, hllc = (float(line.split()[-2]) for line in lines[-2:])
+    assert adaptive < 1e-5 < 1e-1 < hllc
 
 
 @pytest.mark.full
