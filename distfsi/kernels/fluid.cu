@@ -141,107 +141,103 @@ extern "C" __global__ void __launch_bounds__(THREADS) advance_tiles_kernel(PARAM
     real *P = (real *)shared, *F = P + VARIABLES * SP;
     const int tx = threadIdx.x % TILE_X, ty = threadIdx.x / TILE_X;
     const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
-    for (long long at = begin + blockIdx.x; at < end; at += gridDim.x) {
-        const long long t = chosen[at], *tile = tiles + t * tiles_1;
-        const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
-        const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
-        const bool is_calm = calm[t];
-        bool uniform = is_calm;
-        if (!is_calm) {
-            const real *corner = U + u0 - GZ * sz - GY * sy - 2;
-            const bool unlike = is_unlike(corner, corner, nx + 4, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
-                                || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
-            uniform = __syncthreads_count(unlike) == 0;
-        }
-        const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
-        const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
-        const bool inside = tx < n && ty < m;
-        double *out = through + t * 6 * CONSERVED;
-        real low[FLUXES], high[FLUXES], D[FLUXES];
+    const long long at = begin + blockIdx.x;
+    const long long t = chosen[at], *tile = tiles + t * tiles_1;
+    const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
+    const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
+    const bool is_calm = calm[t];
+    bool uniform = is_calm;
+    if (!is_calm) {
+        const real *corner = U + u0 - GZ * sz - GY * sy - 2;
+        const bool unlike = is_unlike(corner, corner, nx + 4, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
+                            || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
+        uniform = __syncthreads_count(unlike) == 0;
+    }
+    const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
+    const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
+    const bool inside = tx < n && ty < m;
+    double *out = through + t * 6 * CONSERVED;
+    real low[FLUXES], high[FLUXES], D[FLUXES];
 
-        for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
-        __syncthreads();
-        if constexpr (DIMENSIONS > 2) {
-            if (inside) flux<2>(P, tx, ty, -1, low, 1);
-            if (sides & 16) {
-                if (inside)
-                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v];
-                __syncthreads();
-                for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
-            }
+    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
+    __syncthreads();
+    if constexpr (DIMENSIONS > 2) {
+        if (inside) flux<2>(P, tx, ty, -1, low, 1);
+        if (sides & 16) {
+            if (inside)
+                for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v];
             __syncthreads();
+            for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
         }
-        for (int k = 0; k < l; k++) {
-            if constexpr (DIMENSIONS > 2) {
-                load_plane(U + u0, P, k + 2, n, m, tx, ty, sy, sz, su);
-                __syncthreads();
+        __syncthreads();
+    }
+    for (int k = 0; k < l; k++) {
+        if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + 2, n, m, tx, ty, sy, sz, su);
+        if (ty < m)
+            for (int i = tx; i < n + 1; i += TILE_X) flux<0>(P, i - 1, ty, k, F + ty * ROW + i, FACES);
+        __syncthreads();
+        if (inside) {
+#pragma unroll
+            for (int v = 0; v < FLUXES; v++) {
+                const real *f = F + v * FACES + ty * ROW + tx;
+                D[v] = (f[1] - f[0]) * cx;
             }
-            if (ty < m)
-                for (int i = tx; i < n + 1; i += TILE_X) flux<0>(P, i - 1, ty, k, F + ty * ROW + i, FACES);
+        }
+        for (int j = 0; j < m; j++) {
+            if (sides & 1) book(out, F + j * ROW, 0, step, 1, x_alike, weight * cx);
+            if (sides & 2) book(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, weight * cx);
+        }
+        if constexpr (DIMENSIONS > 1) {
+            __syncthreads();
+            if (tx < n)
+                for (int j = ty; j < m + 1; j += TILE_Y) flux<1>(P, tx, j - 1, k, F + j * ROW + tx, FACES);
             __syncthreads();
             if (inside) {
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) {
-                    const real *f = F + v * FACES + ty * ROW + tx;
-                    D[v] = (f[1] - f[0]) * cx;
+                    const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
+                    D[v] = D[v] + (f[ROW] - f[0]) * cy;
                 }
             }
-            for (int j = 0; j < m; j++) {
-                if (sides & 1) book(out, F + j * ROW, 0, step, 1, x_alike, weight * cx);
-                if (sides & 2) book(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, weight * cx);
-            }
-            if constexpr (DIMENSIONS > 1) {
-                __syncthreads();
-                if (tx < n)
-                    for (int j = ty; j < m + 1; j += TILE_Y) flux<1>(P, tx, j - 1, k, F + j * ROW + tx, FACES);
-                __syncthreads();
-                if (inside) {
-#pragma unroll
-                    for (int v = 0; v < FLUXES; v++) {
-                        const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
-                        D[v] = D[v] + (f[ROW] - f[0]) * cy;
-                    }
-                }
-                if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
-                if (sides & 8) book(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, weight * cy);
-            }
-            if constexpr (DIMENSIONS > 2) {
-                if (inside) {
-                    flux<2>(P, tx, ty, k, high, 1);
-#pragma unroll
-                    for (int v = 0; v < FLUXES; v++) D[v] = D[v] + (high[place(v, 2)] - low[place(v, 2)]) * cz;
-#pragma unroll
-                    for (int v = 0; v < FLUXES; v++) low[v] = high[v];
-                }
-                if ((sides & 32) && k == l - 1) {
-                    __syncthreads();
-                    if (inside)
-                        for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v];
-                    __syncthreads();
-                    for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
-                }
-            }
+            if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
+            if (sides & 8) book(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, weight * cy);
+        }
+        if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                const long long u = u0 + k * sz + ty * sy + tx;
-                real before[VARIABLES], now[VARIABLES];
+                flux<2>(P, tx, ty, k, high, 1);
 #pragma unroll
-                for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
-                const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
-                const auto divergence = tuple_of<FLUXES>(D);
-                put(updated(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt), U_new + u, su);
+                for (int v = 0; v < FLUXES; v++) D[v] = D[v] + (high[place(v, 2)] - low[place(v, 2)]) * cz;
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) low[v] = high[v];
             }
-            __syncthreads();
+            if ((sides & 32) && k == l - 1) {
+                __syncthreads();
+                if (inside)
+                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v];
+                __syncthreads();
+                for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+            }
         }
-        bool unchanged = uniform;
-        for (int v = 0; v < VARIABLES && uniform; v++) {
-            const real value = U_new[u0 + v * su];
-            unchanged = unchanged && U[u0 + v * su] == value && U_n[u0 + v * su] == value;
-            for (int k = 0; k < nz && !is_calm; k++)
-                for (int j = ty; j < ny; j += TILE_Y)
-                    for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
+        if (inside) {
+            const long long u = u0 + k * sz + ty * sy + tx;
+            real before[VARIABLES], now[VARIABLES];
+#pragma unroll
+            for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
+            const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
+            const auto divergence = tuple_of<FLUXES>(D);
+            put(updated(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt), U_new + u, su);
         }
-        if (threadIdx.x == 0) stages[t] = unchanged ? stages[t] + 1 : 0;
+        __syncthreads();
     }
+    bool unchanged = uniform;
+    for (int v = 0; v < VARIABLES && uniform; v++) {
+        const real value = U_new[u0 + v * su];
+        unchanged = unchanged && U[u0 + v * su] == value && U_n[u0 + v * su] == value;
+        for (int k = 0; k < nz && !is_calm; k++)
+            for (int j = ty; j < ny; j += TILE_Y)
+                for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
+    }
+    if (threadIdx.x == 0) stages[t] = unchanged ? stages[t] + 1 : 0;
 }
 
 #else
@@ -253,35 +249,33 @@ extern "C" __global__ void __launch_bounds__(THREADS) fastest_signals_kernel(PAR
     __shared__ real largest[THREADS];
     const real rates[3] = {rx, ry, rz};
     const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
-    for (long long at = begin + blockIdx.x; at < end; at += gridDim.x) {
-        const long long block = chosen[at], nx = extent[3 * block], ny = extent[3 * block + 1], nz = extent[3 * block + 2];
-        const real *first = U + block * VARIABLES * su + start;
-        real most = 0, invalid = 0;
-        for (long long cell = threadIdx.x; cell < nx * ny * nz; cell += THREADS) {
-            const real *u = first + cell / (nx * ny) * sz + cell / nx % ny * sy + cell % nx;
-            real state[VARIABLES];
+    const long long at = begin + blockIdx.x;
+    const long long block = chosen[at], nx = extent[3 * block], ny = extent[3 * block + 1], nz = extent[3 * block + 2];
+    const real *first = U + block * VARIABLES * su + start;
+    real most = 0, invalid = 0;
+    for (long long cell = threadIdx.x; cell < nx * ny * nz; cell += THREADS) {
+        const real *u = first + cell / (nx * ny) * sz + cell / nx % ny * sy + cell % nx;
+        real state[VARIABLES];
 #pragma unroll
-            for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
-            const auto W = primitives(tuple_of<VARIABLES>(state));
-            const real c = sound_speed(W);
-            real w[VARIABLES];
-            put(W, w, 1);
-            real signal = (magnitude(w[PHASES]) + c) * rates[0];
-            for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
-            most = maximum(most, signal);
-            invalid = invalid + (signal - signal);
-        }
-        largest[threadIdx.x] = most + invalid;
-        for (int half = THREADS / 2; half > 0; half /= 2) {
-            __syncthreads();
-            if (threadIdx.x < half) {
-                const real mine = largest[threadIdx.x], other = largest[threadIdx.x + half];
-                largest[threadIdx.x] = other <= mine || mine != mine ? mine : other;
-            }
-        }
-        if (threadIdx.x == 0) fastest[block] = largest[0];
-        __syncthreads();
+        for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
+        const auto W = primitives(tuple_of<VARIABLES>(state));
+        const real c = sound_speed(W);
+        real w[VARIABLES];
+        put(W, w, 1);
+        real signal = (magnitude(w[PHASES]) + c) * rates[0];
+        for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
+        most = maximum(most, signal);
+        invalid = invalid + (signal - signal);
     }
+    largest[threadIdx.x] = most + invalid;
+    for (int half = THREADS / 2; half > 0; half /= 2) {
+        __syncthreads();
+        if (threadIdx.x < half) {
+            const real mine = largest[threadIdx.x], other = largest[threadIdx.x + half];
+            largest[threadIdx.x] = other <= mine || mine != mine ? mine : other;
+        }
+    }
+    if (threadIdx.x == 0) fastest[block] = largest[0];
 }
 
 #endif
