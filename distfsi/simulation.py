@@ -200,7 +200,7 @@ class Simulation:
         return self.time >= self.scene.time.end or (limit is not None and self.steps >= limit)
 
     def outputs(self) -> tuple[dict | None, dict | None]:
-        """Fields of cells and particles for the output files."""
+        """Collective. Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
         for watcher in self.watchers:
@@ -208,7 +208,10 @@ class Simulation:
                 cells |= watcher.outputs(covered)
         if self.scene.output.schlieren:
             cells["schlieren"] = schlieren(self.fluid, covered)
-        return cells, self.solid.outputs() if self.solid else None
+        if self.solid is None:
+            return cells, None
+        self.solid.label_pieces()
+        return cells, self.solid.outputs()
 
 
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:

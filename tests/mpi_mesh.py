@@ -207,7 +207,9 @@ def check_particles(communicator, grid, block_cells, number, reach):
     check_ghost_particles(
         blocks, everything, mine, exchange.ghosts(mine["position"], mine["id"], reach), reach, nothing
     )
-    bonded = np.random.default_rng(communicator.rank).choice(everything["id"], 40)  # near, far and own ones
+    rng = np.random.default_rng(communicator.rank)
+    mirrors = sum(1 << axis for axis, kinds in enumerate(blocks.grid.boundaries) if "symmetry" in kinds)
+    bonded = 8 * rng.choice(everything["id"], 40) + (rng.integers(8, size=40) & mirrors)  # near, far and own ones
     plan = exchange.ghosts(mine["position"], mine["id"], reach, bonded)
     check_ghost_particles(blocks, everything, mine, plan, reach, bonded)
 
@@ -218,7 +220,7 @@ def expected_ghosts(blocks, everything, reach, bonded):
     own = blocks.owners == blocks.communicator.rank
     position = everything["position"][:, None]
     close = ((position >= low[own] - reach) & (position <= high[own] + reach)).all(axis=2).any(axis=1)
-    close |= np.isin(everything["id"], bonded)
+    close |= np.isin(everything["id"], bonded // 8)
     block = expected_blocks(blocks, everything["position"])
     order = np.lexsort((everything["id"], block))
     return order[close[order] & ~own[block[order]]]
@@ -245,6 +247,7 @@ def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     position = everything["position"]
     planes = nearest_planes(blocks.grid, position)
     near = (np.abs(position - planes) <= reach) @ (1 << np.arange(position.shape[1]))
+    np.bitwise_or.at(near, [row_of[i] for i in (bonded // 8).tolist()], bonded % 8)
     images = [8 * i + mask for i in ids.tolist() for mask in range(1, 8) if mask & near[row_of[i]] == mask]
     assert plan.count == len(plan.key)
     assert sorted(plan.key[len(ids) :].tolist()) == sorted(images)

@@ -20,11 +20,21 @@ SOFT_EOS = d.LinearEos(bulk_modulus=3.25e9)
 SOFT = d.PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
 
 
-def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None):
-    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), eos, strength, fixed)
+def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None, failure=None):
+    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), eos, strength, fixed, failure)
 
 
-def solid(bodies, lower, upper, symmetric=(), threads=1, block_cells=4, gravity=None, viscosity=(1.0, 2.0)):
+def solid(
+    bodies,
+    lower,
+    upper,
+    symmetric=(),
+    threads=1,
+    block_cells=4,
+    gravity=None,
+    viscosity=(1.0, 2.0),
+    form="updated_lagrangian",
+):
     """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
     D = len(lower)
     kinds = tuple(("symmetry" if axis in symmetric else "outflow", "outflow") for axis in range(D))
@@ -34,7 +44,7 @@ def solid(bodies, lower, upper, symmetric=(), threads=1, block_cells=4, gravity=
         time=d.Time(1.0, 0.5, None),
         gravity=gravity or (0.0,) * D,
         fluid=None,
-        solid=d.Solid(tuple(bodies), 1.3, *viscosity),
+        solid=d.Solid(tuple(bodies), 1.3, *viscosity, form=form),
         output=d.Output("", 0.0, 1),
         performance=d.Performance((block_cells,) * D, (block_cells,) * D),
     )
@@ -62,6 +72,7 @@ def digest(part):
     ids = part.communicator.concatenate(c["id"])
     totals = [part.totals()[name] for name in ("mass", "kinetic", "internal", "momentum")]
     totals += [part.boundary_impulse(), part.gravity_work()]
+    totals += [value.ravel() for value in (part.pieces() or {}).values()]
     text = rows[np.argsort(ids)].tobytes() + np.concatenate([np.atleast_1d(t) for t in totals]).tobytes()
     return len(ids), hashlib.sha256(text).hexdigest()
 
@@ -81,10 +92,28 @@ def colliding_balls(threads):
     return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), threads, block_cells=2), 25
 
 
+def bonded_discs(threads):
+    """Two discs of bonded particles, a half of each, that meet and bounce."""
+    left = body(d.Ball((-0.42, 0.0), 0.3), 0.05, 8930.0, (900.0, 0.0))
+    right = body(d.Ball((0.3, 0.0), 0.3), 0.04, 2000.0, (-300.0, 0.0), SOFT_EOS, SOFT)
+    bodies = [left, right]
+    return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), threads, block_cells=2, form="total_lagrangian"), 80
+
+
+def bursting_ball(threads):
+    """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
+    failure = d.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, d.Scatter(10.0, 0.1, 1))
+    ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
+    part = solid([ball], (-1.0, -1.0, 0.0), (1.0,) * 3, (2,), threads, block_cells=2, form="total_lagrangian")
+    x = part.columns["position"]
+    part.columns["velocity"] = 500.0 * x + 500.0 * np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
+    return part, 90
+
+
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
-    for case in (colliding_discs, colliding_balls):
+    for case in (colliding_discs, colliding_balls, bonded_discs, bursting_ball):
         digests = []
         for threads in (1, 2):
             part, steps = case(threads)
@@ -95,6 +124,10 @@ def main():
             end = part.blocks.block_of(part.columns["position"])
             after = part.communicator.concatenate(np.stack([part.columns["id"], end], axis=1))
             assert math.isfinite(part.totals()["internal"])
+            if case is bursting_ball:
+                debris = part.communicator.concatenate(part.columns["bond_count"] == 0)
+                assert 0 < debris.sum() < len(debris)
+                assert debris.sum() < len(part.pieces()["piece"]) < len(debris)
             assert np.any(before[np.argsort(before[:, 0]), 1] != after[np.argsort(after[:, 0]), 1])
             digests.append(digest(part))
         assert digests[0] == digests[1]

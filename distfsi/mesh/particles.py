@@ -94,14 +94,14 @@ class ParticleExchange:
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
         at the ends of the grid extend to infinity. Particles and ghosts within `reach` of symmetry planes have images.
         `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`,
-        on all ranks or none, holds ids of particles that this rank needs as ghosts wherever they are. Raises InputError
-        when a particle could have two images along one axis.
+        on all ranks or none, holds the keys (see GhostPlan) of particles and images that this rank needs wherever they
+        are. Raises InputError when a particle could have two images along one axis.
         """
         own = len(id)
-        planes = self._planes(reach)
+        planes = self.planes(reach)
         pairs = self._near(position, reach)
-        if bonded is not None:
-            pairs += self._bonded(id, bonded)
+        if bonded is not None and self.blocks.communicator.size > 1:
+            pairs += self._bonded(id, np.unique(bonded // IMAGES))
         ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
         arrived = route.transfer(pack({"position": position, "id": id}, rows))
@@ -112,14 +112,35 @@ class ParticleExchange:
             close = np.abs(position[:, axis] - place) <= reach
             near[close] |= 1 << axis
             plane[close, axis] = place
+        if bonded is not None:
+            self._need_images(position, id, bonded, planes, near, plane)
         source, mask = images(near)
         key = np.concatenate([id * IMAGES, id[source] * IMAGES + mask])
         return GhostPlan(own, len(key), key, route, rows, source, mask, plane[source])
 
+    @staticmethod
+    def _need_images(
+        position: np.ndarray,
+        id: np.ndarray,
+        bonded: np.ndarray,
+        planes: list[tuple[int, float]],
+        near: np.ndarray,
+        plane: np.ndarray,
+    ) -> None:
+        """Enter the images that bonds need into `near` (n,) and `plane` (n, dimensions): in the nearest planes."""
+        bonded = bonded[bonded % IMAGES > 0]
+        order = np.argsort(id)
+        rows = order[np.searchsorted(id, bonded // IMAGES, sorter=order)]
+        np.bitwise_or.at(near, rows, bonded % IMAGES)
+        for axis in {axis for axis, _ in planes}:
+            places = np.array([place for a, place in planes if a == axis])
+            nearest = places[np.argmin(np.abs(position[rows, axis][:, None] - places), axis=1)]
+            plane[rows, axis] = nearest
+
     def _bonded(self, id: np.ndarray, bonded: np.ndarray) -> list[np.ndarray]:
         """rank * own + row of the own particles whose ids other ranks ask for."""
         communicator = self.blocks.communicator
-        asked = communicator.allgather(np.setdiff1d(bonded, id))
+        asked = communicator.allgather(bonded)
         others = (rank for rank in range(communicator.size) if rank != communicator.rank)
         return [rank * len(id) + np.flatnonzero(np.isin(id, asked[rank])) for rank in others]
 
@@ -138,8 +159,8 @@ class ParticleExchange:
             pairs.append(rank[other] * len(position) + near[inside][other])
         return pairs
 
-    def _planes(self, reach: float) -> list[tuple[int, float]]:
-        """(axis, place [m]) of the symmetry planes."""
+    def planes(self, reach: float = 0.0) -> list[tuple[int, float]]:
+        """(axis, place [m]) of the symmetry planes; raises InputError when two are less than twice `reach` apart."""
         grid = self.blocks.grid
         planes = []
         for axis in range(grid.dimensions):
@@ -187,7 +208,8 @@ class GhostPlan:
         particles = self.own + len(ghosts)
         extended[: self.own] = array
         extended[self.own : particles] = ghosts
-        extended[particles:] = self._mirror(extended[self._image_source], parity)
+        if particles < self.count:
+            extended[particles:] = self._mirror(extended[self._image_source], parity)
         return extended
 
     def _mirror(self, values: np.ndarray, parity: Parity) -> np.ndarray:

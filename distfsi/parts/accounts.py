@@ -37,6 +37,7 @@ class Accounts:
                 *(f"solid {m}" for m in momentum),
                 "solid kinetic energy [J]",
                 "solid internal energy [J]",
+                *(["solid pieces"] if "piece" in solid.columns else []),
             ]
         if coupling:
             self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
@@ -73,6 +74,8 @@ class Accounts:
             values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}
             values["solid kinetic energy [J]"] = totals["kinetic"]
             values["solid internal energy [J]"] = totals["internal"]
+            if (pieces := self.solid.pieces()) is not None:
+                values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
         book("left", left)
         if self.coupling:

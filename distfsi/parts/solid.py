@@ -1,6 +1,7 @@
-"""The solid: smoothed particles in an updated Lagrangian frame (paper, Sec. 2.1 and Appendix A).
+"""The solid: smoothed particles, their motion and their books (paper, Sec. 2.1 and Appendix A).
 
-A step needs four messages per pair of ranks that are neighbours: who needs whom, the state, the corrected stress, the
+How particles act on each other is a matter of the solid's form: updated.py, bonds.py. A step needs three or four
+messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the corrected stress, the
 new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the
 particles.
 """
@@ -19,8 +20,11 @@ from distfsi.kernels import solid as kernels
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
+from distfsi.parts import bonds, pieces, updated
+from distfsi.parts.bonds import TotalLagrangian
 from distfsi.parts.materials import Materials
-from distfsi.parts.neighbours import NeighbourSearch
+from distfsi.parts.neighbours import Near, NeighbourSearch
+from distfsi.parts.updated import UpdatedLagrangian
 from distfsi.physics.strength import von_mises
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import initial_velocity, pack
@@ -31,10 +35,9 @@ DRIVERS = (
     kernels.fill_cells,
     kernels.order_cells,
     kernels.find_neighbours,
-    kernels.correct,
-    kernels.accelerate,
-    kernels.heat,
     material.deform,
+    *updated.DRIVERS,
+    *bonds.DRIVERS,
 )
 SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
@@ -59,17 +62,21 @@ class Solid:
         self.exchange = ParticleExchange(blocks)
         axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
-        self._matrix = tuple((a, b) for a in axes for b in axes)
         self._components = self.dimensions * (self.dimensions + 1) // 2
         constants = {
             "DIMENSIONS": self.dimensions,
             "COMPONENTS": self._components,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
+            "ZERO_ENERGY": scene.solid.zero_energy,
         } | self.materials.constants
         self.kernels = cpu.build(DRIVERS, constants)
         self._von_mises = plain(von_mises, constants)
-        self.neighbours = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
+        search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
+        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(self.kernels, team, search, self.dimensions)
+        if scene.solid.form == "total_lagrangian":
+            given = (communicator, scene.solid, self.materials.tables[1], self.dimensions)
+            self.form = TotalLagrangian(self.kernels, team, search, *given)
         self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
@@ -91,6 +98,7 @@ class Solid:
         self.columns = c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"])
         self._find_blocks()
         self._deform(0.0, np.zeros((n, self.dimensions**2)))
+        self.form.bind(self.columns, self.exchange)
 
     def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
         body = scene.solid.bodies[b]
@@ -116,22 +124,17 @@ class Solid:
         ranks when a smoothing length is not finite.
         """
         c = self.columns
-        support = 2.0 * self.communicator.maximum(np.array([c["h"].max(initial=0.0)]))[0]
+        support, *flags = self.communicator.maximum(np.array([c["h"].max(initial=0.0), *self.form.flags(c)]))
+        support *= 2.0
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
-        state = [c[name] for name in ("mass", "density", "h", "sound_speed", "velocity")]
+        state = np.column_stack([c[name] for name in ("mass", "density", "h", "sound_speed", "velocity")])
         parity = ((),) * kernels.VELOCITY + self._vector
-        self._plan = self.exchange.ghosts(c["position"], c["id"], max(reach, support))
-        self._position, self._state = self._plan.exchange(
-            [(c["position"], "position"), (np.column_stack(state), parity)]
-        )
-        own = self._plan.own
-        self.neighbours.find(own, self._position, self._state, self._plan.key, support)
-        self._correction, stress = np.empty((2, own, self.dimensions**2))
-        self._run(self.kernels.correct, *self._pairs, c["pressure"], c["deviator"], self._correction, stress)
-        (self._stress,) = self._plan.exchange([(stress, self._matrix)])
-        self._acceleration, self._limits = np.empty((own, self.dimensions)), np.empty((own, len(LIMITS)))
-        self._run(self.kernels.accelerate, *self._pairs, self._stress, self._acceleration, self._limits)
+        plan = self.exchange.ghosts(c["position"], c["id"], max(reach, support), self.form.asked(c))
+        position, state, *told = plan.exchange([(c["position"], "position"), (state, parity), *self.form.told(c)])
+        self._near = Near(plan, position, state, support, told, flags)
+        self._acceleration, self._limits = np.empty((plan.own, self.dimensions)), np.empty((plan.own, len(LIMITS)))
+        self.form.accelerate(c, self._near, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
         """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare()."""
@@ -146,6 +149,11 @@ class Solid:
 
         The energy takes the mean of old and new velocities: kinetic plus internal energy grow by the external work.
         """
+        self.kick(dt, impulse)
+        self.drift(dt)
+
+    def kick(self, dt: float, impulse: np.ndarray | None = None) -> None:
+        """After prepare(). Give the particles the velocities after `dt` [s] of the forces and after the `impulse`."""
         c = self.columns
         mass, fixed = c["mass"][:, None], c["fixed"][:, None]
         impulse = np.zeros_like(c["velocity"]) if impulse is None else impulse
@@ -158,13 +166,16 @@ class Solid:
         held = -(fixed * (received + weight + impulse))  # impulse of what moves the fixed particles
         self._gravity_work += self._per_block((weight * mean + held * velocity).sum(axis=1, keepdims=True))[:, 0]
         self._boundary_impulse += self._per_block(received + weight + held)
-
-        (around,) = self._plan.exchange([(velocity, self._vector)])
-        gradient = np.empty((self._plan.own, self.dimensions**2))
-        self._run(self.kernels.heat, *self._pairs, dt, self._stress, self._correction, around, c["energy"], gradient)
-        self._deform(dt, gradient)
         c["velocity"] = velocity
-        c["position"] = c["position"] + dt * velocity
+
+    def drift(self, dt: float) -> None:
+        """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
+        c = self.columns
+        (around,) = self._near.plan.exchange([(c["velocity"], self._vector)])
+        gradient = np.empty((self._near.own, self.dimensions**2))
+        self.form.strain(c, self._near, dt, around, gradient)
+        self._deform(dt, gradient)
+        c["position"] = c["position"] + dt * c["velocity"]
 
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
@@ -178,11 +189,6 @@ class Solid:
 
     def _run(self, kernel: Callable, *arguments) -> None:
         self.team.run(kernel, len(self.columns["id"]), *arguments)
-
-    @property
-    def _pairs(self) -> tuple[np.ndarray, ...]:
-        """What a loop over pairs reads."""
-        return self._position, self._state, self.neighbours.table, self.neighbours.count
 
     # ---- totals and output ------------------------------------------------------------------------------------------
 
@@ -204,12 +210,12 @@ class Solid:
     @property
     def around(self) -> dict[str, np.ndarray]:
         """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, h, key."""
-        s, v = self._state, kernels.VELOCITY
+        s, v = self._near.state, kernels.VELOCITY
         scalars = {"mass": kernels.MASS, "density": kernels.DENSITY, "h": kernels.SMOOTHING}
         return {
-            "position": self._position,
+            "position": self._near.position,
             "velocity": np.ascontiguousarray(s[:, v : v + self.dimensions]),
-            "key": self._plan.key,
+            "key": self._near.plan.key,
         } | {name: np.ascontiguousarray(s[:, column]) for name, column in scalars.items()}
 
     def check(self, time: float) -> None:
@@ -239,6 +245,15 @@ class Solid:
         total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
         mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
         return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
+
+    def pieces(self) -> dict[str, np.ndarray] | None:
+        """Collective. The pieces that intact bonds hold together: see parts/pieces.py; None without bonds."""
+        self.label_pieces()
+        return pieces.table(self.columns, self._block, self.blocks) if "piece" in self.columns else None
+
+    def label_pieces(self) -> None:
+        """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
+        self.form.label_pieces(self.columns, self.exchange)
 
     def boundary_impulse(self) -> np.ndarray:
         """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
@@ -271,6 +286,7 @@ class Solid:
         c = c if chosen is None else {name: column[chosen] for name, column in c.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
+        names += [name for name in ("piece",) if name in c]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant
 

@@ -52,8 +52,9 @@ sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m
 # ---- solid -----------------------------------------------------------------------------------------------------------
 
 COMPONENTS = Symbol("stored components of a symmetric tensor: DIMENSIONS (DIMENSIONS + 1)/2")
-VISCOSITY_ALPHA = Symbol("Monaghan viscosity, linear part")
-VISCOSITY_BETA = Symbol("Monaghan viscosity, quadratic part")
+VISCOSITY_ALPHA = Symbol("artificial viscosity, linear part")
+VISCOSITY_BETA = Symbol("artificial viscosity, quadratic part")
+ZERO_ENERGY = Symbol("stiffness against what the deformation gradient does not see, in longitudinal moduli")
 POLAR_ROTATION = Symbol("whether stresses turn with the rotation of the polar decomposition; else with the vorticity")
 FAILS = Symbol("whether any material can fail")
 CONCRETE = Symbol("whether any material is concrete")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
+SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
@@ -316,6 +317,8 @@ class Solid:
     viscosity_alpha: float
     viscosity_beta: float
     objective_rate: ObjectiveRate = "jaumann"
+    form: SolidForm = "updated_lagrangian"
+    zero_energy: float = 0.1
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

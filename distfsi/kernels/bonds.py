@@ -1,0 +1,230 @@
+"""Loops of the total Lagrangian form: strain, forces and energy of the bonds, and cutting them.
+
+A particle's bonds are in the order of their partners' keys. `bond[i]` holds for each of them the vector g and the
+weight w of physics/bonds.py, `partner[i]` the partner's row among a rank's own particles, ghosts and images. `tension`
+(count, columns below) is what a force needs of a particle: stiffness, displacement, bond stress.
+"""
+
+from math import sqrt
+
+from distfsi.device.markers import driver, helper
+from distfsi.kernels.material import matrix_of
+from distfsi.kernels.solid import difference, no_matrix, plus, store_matrix
+from distfsi.physics.bonds import (
+    LEAST_GROWTH,
+    bond_stress,
+    bulk_viscosity,
+    least_stretch,
+    signal_time,
+    whole_step,
+    zero_energy_stiffness,
+)
+from distfsi.physics.pair import gradient_correction
+from distfsi.physics.smoothing import smoothing_slope
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
+from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, trace
+
+STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
+
+
+@helper
+def outer(a, b):
+    """Matrix a b^T."""
+    return tuple(tuple(a[m] * b[n] for n in static_range(DIMENSIONS)) for m in static_range(DIMENSIONS))
+
+
+@helper
+def times_bond(matrix, bond, i, n):
+    """A matrix times the vector g of bond n of particle i."""
+    return tuple(
+        sum(matrix[a][b] * bond[i, n * (DIMENSIONS + 1) + b] for b in static_range(DIMENSIONS))
+        for a in static_range(DIMENSIONS)
+    )
+
+
+@helper
+def bond_vector(bond, i, n):
+    """The vector g of bond n of particle i."""
+    return tuple(bond[i, n * (DIMENSIONS + 1) + d] for d in static_range(DIMENSIONS))
+
+
+@helper
+def bond_weight(bond, i, n):
+    """The weight w of bond n of particle i."""
+    return bond[i, n * (DIMENSIONS + 1) + DIMENSIONS]
+
+
+# ---- the reference state --------------------------------------------------------------------------------------------
+
+
+@driver
+def find_partners(begin, end, key, bond_count, keys, rows, partner):
+    """partner[i] = the rows of the bonds' keys, which ascend; `keys` ascend, `rows` are theirs. A row of -1: none."""
+    for i in range(begin, end):
+        low = 0
+        for n in range(bond_count[i]):
+            stride = 1
+            while low + stride < len(keys) and keys[low + stride] <= key[i, n]:
+                low += stride
+                stride *= 2
+            high = min(low + stride, len(keys))
+            while high - low > 1:
+                middle = (low + high) // 2
+                if keys[middle] <= key[i, n]:
+                    low = middle
+                else:
+                    high = middle
+            partner[i, n] = rows[low] if keys[low] == key[i, n] else -1
+
+
+@driver
+def weigh(begin, end, reference, volume, size, body, bond_count, partner, bond):
+    """bond[i] = vectors and weights of the bonds; `size` are the reference smoothing lengths of the bodies."""
+    for i in range(begin, end):
+        for n in range(bond_count[i]):
+            j = partner[i, n]
+            X = difference(reference, 0, j, i)
+            w = -volume[j] * smoothing_slope(dot(X, X), size[body[i]])
+            for d in static_range(DIMENSIONS):
+                bond[i, n * (DIMENSIONS + 1) + d] = w * X[d]
+            bond[i, n * (DIMENSIONS + 1) + DIMENSIONS] = w
+
+
+@driver
+def fit(begin, end, chosen, bond_count, partner, bond, reference, displacement, correction, deformation, moments):
+    """Row r: gradient correction and deformation gradient of particle chosen[r], from the bonds that it has.
+
+    moments[r] = determinant and least eigenvalue of the moment of its bonds.
+    """
+    for r in range(begin, end):
+        i = chosen[r]
+        moment, total = no_matrix(), no_matrix()
+        for n in range(bond_count[i]):
+            j, g = partner[i, n], bond_vector(bond, i, n)
+            moment = plus(moment, outer(difference(reference, 0, j, i), g))
+            total = plus(total, outer(difference(displacement, 0, j, i), g))
+        matrix = gradient_correction(moment)
+        store_matrix(correction, r, matrix)
+        store_matrix(deformation, r, identity_plus(1.0, product(total, matrix)))
+        moments[r, 0] = determinant(moment)
+        moments[r, 1] = least_eigenvalue(moment)
+
+
+@driver
+def cut(begin, end, position, reference, failed, loose, key, bond_count, partner, bond, lost):
+    """Cut the bonds whose ends have both failed, where they are stretched, and those of a loose particle.
+
+    lost[i] = how many bonds particle i has lost; the others keep their order.
+    """
+    for i in range(begin, end):
+        kept = 0
+        for n in range(bond_count[i]):
+            j = partner[i, n]
+            x, X = difference(position, 0, j, i), difference(reference, 0, j, i)
+            stretched = failed[i] > 0 and failed[j] > 0 and dot(x, x) > dot(X, X)
+            if not (stretched or loose[i] > 0 or loose[j] > 0):
+                if kept < n:
+                    key[i, kept] = key[i, n]
+                    partner[i, kept] = j
+                    for d in range(DIMENSIONS + 1):
+                        bond[i, kept * (DIMENSIONS + 1) + d] = bond[i, n * (DIMENSIONS + 1) + d]
+                kept += 1
+        for n in range(kept, bond_count[i]):
+            key[i, n] = -1
+        lost[i] = bond_count[i] - kept
+        bond_count[i] = kept
+
+
+# ---- a step ---------------------------------------------------------------------------------------------------------
+
+
+@driver
+def stress_bonds(
+    begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, tension
+):
+    """tension[i] = stiffness and bond stress of particle i."""
+    for i in range(begin, end):
+        kappa = zero_energy_stiffness(density[i], sound[i], strain[i], strength[body[i], 0], strength[body[i], 1])
+        S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
+        stress = bond_stress(S, pressure[i] + viscous[i], matrix_of(deformation, i), matrix_of(correction, i), kappa)
+        tension[i, STIFFNESS] = kappa
+        for a in static_range(DIMENSIONS):
+            for b in static_range(DIMENSIONS):
+                tension[i, 1 + DIMENSIONS + a * DIMENSIONS + b] = stress[a][b]
+
+
+@helper
+def stress_of(tension, i):
+    """Bond stress of particle i."""
+    return tuple(
+        tuple(tension[i, 1 + DIMENSIONS + a * DIMENSIONS + b] for b in static_range(DIMENSIONS))
+        for a in static_range(DIMENSIONS)
+    )
+
+
+@driver
+def pull(begin, end, bond_count, partner, bond, tension, volume, mass, acceleration):
+    """Add to acceleration[i] that of the bonds."""
+    for i in range(begin, end):
+        own, kappa = stress_of(tension, i), tension[i, STIFFNESS]
+        force = tuple(0.0 for _ in static_range(DIMENSIONS))
+        for n in range(bond_count[i]):
+            j = partner[i, n]
+            stress = times_bond(plus(own, stress_of(tension, j)), bond, i, n)
+            spring = (kappa + tension[j, STIFFNESS]) * bond_weight(bond, i, n)
+            u = difference(tension, DISPLACEMENT, j, i)
+            force = tuple(force[d] + (stress[d] + spring * u[d]) for d in static_range(DIMENSIONS))
+        for d in static_range(DIMENSIONS):
+            acceleration[i, d] += volume[i] / mass[i] * force[d]
+
+
+@driver
+def stretch(
+    begin, end, dt, bond_count, partner, bond, tension, motion, volume, mass, correction, h, density, sound,
+    deformation, energy, viscous, gradient, loose
+):  # fmt: skip
+    """Advance energy and deformation gradient by `dt`; gradient[i] = the velocity gradient of the step.
+
+    A particle that would be crushed to a tenth or turned inside out keeps its deformation and becomes loose.
+
+    `motion` (count, 2 D) holds the means of old and new velocities, with which kinetic and internal energy exchange
+    exactly, and the new velocities, which strain the bonds.
+    """
+    for i in range(begin, end):
+        if bond_count[i] > 0:
+            own, kappa = stress_of(tension, i), tension[i, STIFFNESS]
+            power, total = 0.0, no_matrix()
+            for n in range(bond_count[i]):
+                j = partner[i, n]
+                pulled, spring = times_bond(own, bond, i, n), kappa * bond_weight(bond, i, n)
+                u, mean = difference(tension, DISPLACEMENT, j, i), difference(motion, 0, j, i)
+                power += sum((pulled[d] + spring * u[d]) * mean[d] for d in static_range(DIMENSIONS))
+                total = plus(total, outer(difference(motion, DIMENSIONS, j, i), bond_vector(bond, i, n)))
+            energy[i] += dt * volume[i] / mass[i] * power
+            before = matrix_of(deformation, i)
+            after = plus(before, product(scaled(dt, total), matrix_of(correction, i)))
+            if determinant(after) > LEAST_GROWTH * determinant(before):
+                rates = whole_step(before, after, dt)
+                store_matrix(deformation, i, after)
+                store_matrix(gradient, i, rates)
+                viscous[i] = bulk_viscosity(trace(rates), density[i], h[i], sound[i])
+            else:
+                loose[i] = 1
+
+
+@helper
+def scaled(factor, matrix):
+    """`factor` times a matrix."""
+    return tuple(tuple(factor * matrix[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+
+
+@driver
+def bound(begin, end, bond_count, size, body, sound, viscous, density, deformation, acceleration, limits):
+    """limits[i] = the time steps that a bonded particle allows."""
+    for i in range(begin, end):
+        if bond_count[i] > 0:
+            shortest = size[body[i]] * least_stretch(matrix_of(deformation, i))
+            a = tuple(acceleration[i, d] for d in static_range(DIMENSIONS))
+            limits[i, 0] = signal_time(shortest, sound[i], viscous[i], density[i])
+            limits[i, 1] = 0.3 * sqrt(shortest / max(sqrt(dot(a, a)), 1e-300))

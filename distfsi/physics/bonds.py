@@ -1,0 +1,98 @@
+"""Total Lagrangian form: strain and forces on the bonds between neighbours of the reference state.
+
+X is the position of a particle in the reference state, u its displacement. The bond from i to j has the weight
+w = -V_j (dW/dr)/r and the vector g = w (X_j - X_i); gradients are corrected by B = (sum of (X_j - X_i) g)^-1, so that
+they are exact for linear fields. F = 1 + (sum of (u_j - u_i) g) B is then the least-squares fit to the deformed bonds,
+and what the fit leaves over, r = (x_j - x_i) - F (X_j - X_i), gives zero when summed with the vectors g. An energy
+kappa/2 sum of w r^2 per volume thus resists all that F does not see, and its forces need no derivative of F (after
+Silling, Comput. Methods Appl. Mech. Eng. 322, 2017): they keep momentum and angular momentum, and no linear deformation
+feels them.
+"""
+
+from math import log, sqrt
+
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
+from distfsi.physics.tensors import determinant, inverse, product, rows, trace, transposed
+
+LEAST_GROWTH = 0.1  # of the volume in a step that can be taken
+
+
+def whole_step(before, after, dt):
+    """The velocity gradient [1/s] that takes the deformation gradient from `before` to `after` in `dt`.
+
+    It is Hughes and Winget's, of the state half-way, but for two things: its spin times `dt` is the angle of the turn,
+    and its trace times `dt` the logarithm of the ratio of volumes. A rigid turn by any angle has no strain.
+    """
+    change = tuple(
+        tuple(after[a][b] - before[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
+    )
+    middle = tuple(
+        tuple(0.5 * (after[a][b] + before[a][b]) for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
+    )
+    step = product(change, inverse(middle))
+    turn = tuple(tuple(step[a][b] - step[b][a] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+    tangent2 = 0.03125 * sum(
+        sum(turn[a][b] * turn[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS)
+    )  # of half the angle
+    shorter = 1.0 - tangent2 * (1.0 / 3.0 - 0.2 * tangent2)
+    growth = log(determinant(after) / determinant(before))
+    missing = (growth - trace(step)) * (2.0 / DIMENSIONS)
+    rate = 0.5 / dt
+    return tuple(
+        tuple(
+            rate * (step[a][b] + step[b][a] + shorter * turn[a][b] + (missing if a == b else 0.0))
+            for b in static_range(DIMENSIONS)
+        )
+        for a in static_range(DIMENSIONS)
+    )
+
+
+def bulk_viscosity(divergence, density, size, sound_speed):
+    """Viscous pressure [Pa] of a compression: quadratic in the jump of velocity over a particle's `size` [m].
+
+    The linear part is that of an acoustic Riemann solver, limited to jumps that are not small beside the sound speed:
+    bending and plastic flow are not damped.
+    """
+    jump = max(-size * divergence, 0.0)
+    limiter = min(30.0 * jump / sound_speed, 1.0)
+    return density * jump * (0.5 * VISCOSITY_ALPHA * limiter * sound_speed + VISCOSITY_BETA * jump)
+
+
+def zero_energy_stiffness(density, sound_speed, plastic_strain, shear_modulus, flow_stress):
+    """kappa [Pa]: a share of the longitudinal modulus, of the secant modulus once the particle has flowed."""
+    secant = 1.0 + 3.0 * shear_modulus * plastic_strain / max(flow_stress, 1e-300)
+    return ZERO_ENERGY * density * sound_speed * sound_speed / secant
+
+
+def bond_stress(deviator, pressure, deformation, correction, stiffness):
+    """J (S - p 1) F^-T B - kappa (F - 1) [Pa], by rows: what turns the vectors g into forces per volume."""
+    S = rows(deviator)
+    stress = tuple(
+        tuple(S[a][b] - (pressure if a == b else 0.0) for b in static_range(DIMENSIONS))
+        for a in static_range(DIMENSIONS)
+    )
+    volume = determinant(deformation)
+    piola = product(product(stress, transposed(inverse(deformation))), correction)
+    return tuple(
+        tuple(
+            volume * piola[a][b] - stiffness * (deformation[a][b] - (1.0 if a == b else 0.0))
+            for b in static_range(DIMENSIONS)
+        )
+        for a in static_range(DIMENSIONS)
+    )
+
+
+def least_stretch(deformation):
+    """Lower bound of the principal stretches, tight when the others are equal (Wolkowicz & Styan 1980)."""
+    back = inverse(deformation)
+    squared = product(back, transposed(back))
+    mean = trace(squared) * (1.0 / DIMENSIONS)
+    spread = max(trace(product(squared, squared)) * (1.0 / DIMENSIONS) - mean * mean, 0.0)
+    return 1.0 / sqrt(mean + sqrt(spread * (DIMENSIONS - 1.0)))
+
+
+def signal_time(shortest, sound_speed, viscous_pressure, density):
+    """Longest step [s] that signals allow, with safety 0.3; `shortest` [m]: h along the most compressed direction."""
+    signal = sound_speed + viscous_pressure / (density * sound_speed)
+    return 0.3 * shortest / signal

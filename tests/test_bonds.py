@@ -1,0 +1,130 @@
+"""The total Lagrangian form: exactness, conservation, zero-energy modes, waves, contact, failure, ranks, restarts."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from distfsi.scene.description import Ball, Box, Elastic, LinearEos, NoStrength, PerfectlyPlastic
+from mpi_solid import COPPER_EOS, body, solid, step
+
+RUBBER_EOS, RUBBER = LinearEos(3.25e6), Elastic(0.7e6)
+
+
+def total_lagrangian(bodies, lower, upper, *arguments, **keywords):
+    return solid(bodies, lower, upper, *arguments, form="total_lagrangian", **keywords)
+
+
+def energy(part):
+    totals = part.totals()
+    return totals["kinetic"] + totals["internal"]
+
+
+def angular_momentum(part):
+    x, v = part.columns["position"], part.columns["velocity"]
+    return (part.columns["mass"] * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum()
+
+
+def rubber_ball(dimensions, spacing, **keywords):
+    ball = body(Ball((0.0,) * dimensions, 0.5), spacing, 1000.0, (0.0,) * dimensions, RUBBER_EOS, RUBBER)
+    return total_lagrangian([ball], (-1.0,) * dimensions, (1.0,) * dimensions, **keywords)
+
+
+@pytest.mark.parametrize(("dimensions", "spacing"), [(1, 0.05), (2, 0.1), (3, 0.125)])
+def test_a_linear_field_is_exact_everywhere(dimensions, spacing):
+    part = rubber_ball(dimensions, spacing)
+    c = part.columns
+    gradient = np.random.default_rng(0).standard_normal((dimensions, dimensions))
+    c["velocity"] = c["position"] @ gradient.T
+    part.prepare()
+    part.drift(0.01)
+    found = c["deformation"].reshape(-1, dimensions, dimensions)
+    expected = np.eye(dimensions) + 0.01 * gradient
+    assert np.allclose(found, expected, rtol=0.0, atol=1e-13)
+    assert np.allclose(c["density"], 1000.0 / np.linalg.det(expected), rtol=1e-13)
+
+
+@pytest.mark.parametrize(("dimensions", "spacing"), [(2, 0.25), (3, 0.25)])
+def test_a_rigid_turn_keeps_the_stress(dimensions, spacing):
+    part = rubber_ball(dimensions, spacing)
+    c, steps, dt = part.columns, 1500, 1e-6
+    c["velocity"] = c["position"] @ np.random.default_rng(0).standard_normal((dimensions, dimensions)).T
+    part.prepare()
+    part.drift(0.01)
+    before = {name: c[name].copy() for name in ("deviator", "density", "pressure", "plastic_strain")}
+    angle = 2.0 * math.pi / steps
+    turn = np.eye(dimensions)
+    turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    for _ in range(steps):
+        c["velocity"] = (c["position"] @ turn.T - c["position"]) / dt
+        part.prepare()
+        part.drift(dt)
+    for name, value in before.items():
+        assert np.allclose(c[name], value, rtol=0.0, atol=1e-10 * np.abs(value).max()), name
+
+
+def test_a_block_has_no_zero_energy_modes_but_rigid_motions():
+    """The forces of small displacements of one particle at a time; those of mirrored particles follow by symmetry."""
+    block = body(Box((-1.0,) * 3, (1.0,) * 3), 0.4, 1000.0, (0.0,) * 3, RUBBER_EOS, RUBBER)
+    part = total_lagrangian([block], (-2.0,) * 3, (2.0,) * 3, viscosity=(0.0, 0.0))
+    start = {name: column.copy() for name, column in part.columns.items()}
+    x, small = start["position"], 1e-6
+    place = np.empty((5, 5, 5), dtype=int)
+    place[tuple(np.rint(x / 0.4).astype(int).T + 2)] = np.arange(125)
+    stiffness = np.empty((125, 3, 125, 3))
+    part.prepare()
+    for particle, axis in itertools.product(place[:3, :3, :3].ravel(), range(3)):
+        for name, column in start.items():
+            part.columns[name][:] = column
+        part.columns["velocity"][particle, axis] = small
+        part.drift(1.0)
+        part.prepare()
+        force = -(part.columns["mass"][:, None] * part._acceleration) / small
+        for mirrored in itertools.product((False, True), repeat=3):
+            sign = np.where(mirrored, -1.0, 1.0)
+            image = place[tuple(np.rint(x * sign / 0.4).astype(int).T + 2)]
+            stiffness[image, :, image[particle], axis] = force * sign * sign[axis]
+    stiffness = stiffness.reshape(375, 375)
+    assert np.allclose(stiffness, stiffness.T, rtol=0.0, atol=1e-5 * np.abs(stiffness).max())
+    modes = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
+    assert np.abs(modes[:6]).max() < 1e-5 * modes[-1]
+    assert modes[6] > 1e-2 * modes[-1]
+
+
+@pytest.mark.parametrize(("dimensions", "spacing", "steps"), [(2, 0.05, 150), (3, 0.1, 60)])
+def test_a_plastic_spinning_body_conserves_everything(dimensions, spacing, steps):
+    shape = Ball((0.0,) * dimensions, 0.5)
+    ball = body(shape, spacing, 1000.0, (0.0,) * dimensions, RUBBER_EOS, PerfectlyPlastic(0.7e6, 2e4))
+    part = total_lagrangian([ball], (-1.0,) * dimensions, (1.0,) * dimensions)
+    c = part.columns
+    x = c["position"]
+    c["velocity"][:, :2] = 20.0 * np.stack([-x[:, 1], x[:, 0]], axis=1)
+    c["velocity"] += np.random.default_rng(1).standard_normal(x.shape)
+    before, spin, whole = part.totals(), angular_momentum(part), energy(part)
+    for _ in range(steps):
+        step(part)
+    after = part.totals()
+    assert part.columns["plastic_strain"].max() > 0.02
+    assert energy(part) == pytest.approx(whole, rel=1e-12)
+    assert angular_momentum(part) == pytest.approx(spin, rel=1e-12)
+    scale = math.sqrt(before["mass"] * before["kinetic"])
+    assert np.abs(after["momentum"] - before["momentum"]).max() < 1e-12 * scale
+
+
+def test_copper_plates_reach_the_hugoniot():
+    length, spacing = 0.01, 5e-5
+    left = body(Box((-length,), (0.0,)), spacing, 8930.0, (250.0,), COPPER_EOS, NoStrength())
+    right = body(Box((0.0,), (length,)), spacing, 8930.0, (-250.0,), COPPER_EOS, NoStrength())
+    part = total_lagrangian([left, right], (-0.02,), (0.02,))
+    before, time = energy(part), 0.0
+    while time < 0.7 * length / 4312.0:
+        time += step(part)[0]
+    c = part.columns
+    x = c["position"][:, 0]
+    plateau = (np.abs(x) > 0.1 * length) & (np.abs(x) < 0.4 * length)
+    assert c["pressure"][plateau].mean() == pytest.approx(9.627e9, rel=2e-3)
+    assert c["density"][plateau].mean() / 8930.0 == pytest.approx(1.0615, rel=1e-3)
+    assert c["energy"][plateau].mean() == pytest.approx(0.5 * 250.0**2, rel=0.01)
+    assert energy(part) == pytest.approx(before, rel=1e-12)
+    assert np.abs(part.totals()["momentum"]).max() < 1e-12 * 8930.0 * length * 250.0
