@@ -53,7 +53,7 @@ class Coupled:
             time=d.Time(1.0, 0.4, None),
             gravity=(0.0,) * D,
             fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
-            solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0),
+            solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form="updated_lagrangian"),
             output=d.Output("", 0.0, 1),
             performance=d.Performance((block,) * D, (block,) * D),
         )

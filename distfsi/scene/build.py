@@ -97,7 +97,9 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
         )
         for name, body in given.bodies.items()
     )
-    return Solid(bodies, given.smoothing, given.viscosity_alpha, given.viscosity_beta, given.objective_rate)
+    viscosity = (given.viscosity_alpha, given.viscosity_beta)
+    form = (given.objective_rate, given.form, given.zero_energy)
+    return Solid(bodies, given.smoothing, *viscosity, *form)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

@@ -310,14 +310,17 @@ class Body:
 
 @dataclass(frozen=True)
 class Solid:
-    """All bodies and how they are computed. h = smoothing * spacing; Monaghan viscosity alpha, beta (Eq. 6)."""
+    """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
+
+    `zero_energy`: the stiffness of bonds against what no deformation gradient sees, in longitudinal moduli.
+    """
 
     bodies: tuple[Body, ...]
     smoothing: float
     viscosity_alpha: float
     viscosity_beta: float
     objective_rate: ObjectiveRate = "jaumann"
-    form: SolidForm = "updated_lagrangian"
+    form: SolidForm = "total_lagrangian"
     zero_energy: float = 0.1
 
 

@@ -141,9 +141,17 @@ class SolidInput(Table):
     """Solid bodies, computed with smoothed particles."""
 
     bodies: dict[str, BodyInput] = Field(min_length=1, description="`[solid.bodies.NAME]`: the bodies")
+    form: description.SolidForm = Field(
+        "total_lagrangian",
+        description="particles hold on to the neighbours they start with, by bonds that damage cuts, or act on those "
+        'that are near ("updated_lagrangian")',
+    )
     smoothing: quantity("1", ge=1.0, le=3.0) = Field(1.3, description="smoothing length over particle spacing")
     viscosity_alpha: quantity("1", ge=0.0) = Field(1.0, description="linear artificial viscosity")
     viscosity_beta: quantity("1", ge=0.0) = Field(2.0, description="quadratic artificial viscosity")
+    zero_energy: quantity("1", ge=0.0, le=1.0) = Field(
+        0.1, description="stiffness of bonds against zero-energy modes, in longitudinal moduli"
+    )
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

@@ -33,13 +33,13 @@ def gases(
     return _endless(domain, fluid, None)
 
 
-def copper(particles: int, dimensions: int) -> scene.Scene:
+def copper(particles: int, dimensions: int, form: scene.SolidForm = "updated_lagrangian") -> scene.Scene:
     """A cube of elastic-plastic copper, so many particles long, that moves freely; the standard solid work."""
     D, side = dimensions, 0.5 * particles
     domain = scene.Domain(
         (-0.5 * side,) * D, (1.5 * side,) * D, (max(4, particles),) * D, (("outflow", "outflow"),) * D
     )
-    return _endless(domain, None, _cube((0.0,) * D, side))
+    return _endless(domain, None, _cube((0.0,) * D, side, form))
 
 
 def blast_on_copper(cells: int, dimensions: int) -> scene.Scene:
@@ -51,14 +51,13 @@ def blast_on_copper(cells: int, dimensions: int) -> scene.Scene:
     return _endless(domain, blast.fluid, cube)
 
 
-def _cube(lower: tuple[float, ...], side: float) -> scene.Solid:
+def _cube(lower: tuple[float, ...], side: float, form: scene.SolidForm = "updated_lagrangian") -> scene.Solid:
     """Copper with two particles per cell along each axis."""
     D = len(lower)
     shape = scene.Box(lower, tuple(a + side for a in lower))
     velocity = (10.0,) + (0.0,) * (D - 1)
-    return scene.Solid(
-        (scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None),), SMOOTHING, 1.0, 2.0
-    )
+    body = scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None)
+    return scene.Solid((body,), SMOOTHING, 1.0, 2.0, form=form)
 
 
 def _endless(domain: scene.Domain, fluid: scene.Fluid | None, solid: scene.Solid | None) -> scene.Scene:
@@ -87,6 +86,8 @@ SOLIDS = {
     "copper_block_1d": lambda: copper(4096, 1),
     "copper_block_2d": lambda: copper(128, 2),
     "copper_block_3d": lambda: copper(32, 3),
+    "bonded_copper_block_2d": lambda: copper(128, 2, "total_lagrangian"),
+    "bonded_copper_block_3d": lambda: copper(32, 3, "total_lagrangian"),
 }
 COUPLED = {"blast_on_copper_2d": lambda: blast_on_copper(256, 2), "blast_on_copper_3d": lambda: blast_on_copper(48, 3)}
 SMALLEST = {
