@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -30,7 +31,7 @@ def draw_scatter(
     path: Path, title: str, x_label: str, y_label: str, points: Sequence[Point],
     others: Sequence[Point] = (), lines: Sequence[tuple[float, str]] = (),
 ) -> Path:  # fmt: skip
-    """Draw the points; `others` as named crosses, `lines` as named values of x; returns `path`."""
+    """Draw the points; `others` as crosses with letters, `lines` as named values of x; returns `path`."""
     groups = list(dict.fromkeys(point.group for point in points))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
@@ -42,9 +43,9 @@ def draw_scatter(
             label = f"{number} {p.name}{' *' if p.best else ''}"
             axes.plot(p.x, p.y, "o", color=color, markersize=6, label=label, alpha=0.8)
             axes.annotate(str(number), (p.x, p.y), xytext=(4, 4), textcoords="offset points", fontsize=8)
-        for p in others:
-            axes.plot(p.x, p.y, "x", color=OTHERS)
-            axes.annotate(p.name, (p.x, p.y), xytext=(4, -8), textcoords="offset points", fontsize=7, color=OTHERS)
+        for letter, p in zip(ascii_lowercase, others, strict=False):
+            axes.plot(p.x, p.y, "x", color=OTHERS, label=f"{letter} {p.name}")
+            axes.annotate(letter, (p.x, p.y), xytext=(4, 4), textcoords="offset points", fontsize=8, color=OTHERS)
         for x, name in lines:
             axes.axvline(x, color=OTHERS, linestyle=":", linewidth=0.8)
             axes.annotate(

@@ -144,7 +144,7 @@ def _seconds(speed: float, cells: int, reference: Outcome) -> float:
 
 
 def peer_lines(problem: Problem, reference: Outcome) -> list[tuple[float, str]]:
-    """What other codes take for the default's cells and steps, where only their speed is known [s]."""
+    """What other codes take for the default's cells and steps with two phases, where only their speed is known [s]."""
     cells = reference.cells * (1 if problem.rows else reference.cells)
     return [
         (cells * reference.steps / peer.cell_steps_per_second, f"{peer.code} {peer.scheme}") for peer in PEER_SPEEDS
@@ -162,7 +162,7 @@ def draw(problem: Problem, outcomes: Sequence[Outcome], scene: Scene) -> None:
     ]
     known = problem is WATER_AIR
     others = peer_points(scene, outcomes[0]) if known else ()
-    lines = () if known else peer_lines(problem, outcomes[0])
+    lines = () if known or len(scene.fluid.phases) == 1 else peer_lines(problem, outcomes[0])
     per_row = " per row" if problem.rows else ""
     draw_scatter(
         DIRECTORY / f"{problem.name}.png", f"{problem.title}: default {outcomes[0].cells} cells along x",
