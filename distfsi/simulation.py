@@ -15,6 +15,7 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from distfsi.device.cpu import Team
+from distfsi.device.seam import Device
 from distfsi.errors import Diverged, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -102,11 +103,19 @@ class Simulation:
 
     @classmethod
     def of(
-        cls, scene: Scene, communicator: Communicator, threads: int | None = None, costs: np.ndarray | None = None
+        cls,
+        scene: Scene,
+        communicator: Communicator,
+        threads: int | None = None,
+        costs: np.ndarray | None = None,
+        device: Device | None = None,
     ) -> Simulation:
-        """Build the parts the scene needs, and no others; `costs`: those of the blocks where they are known."""
+        """Build the parts the scene needs, and no others.
+
+        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
+        """
         blocks = deal_blocks(scene, communicator, costs)
-        team = Team(threads or threads_of_rank(communicator))
+        team = device or Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
         solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None

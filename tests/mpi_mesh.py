@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from distfsi.device.cpu import Team
 from distfsi.errors import Diverged
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import Blocks, Grid
@@ -70,7 +71,7 @@ def check_ghost_cells(communicator, copy, grid, block_cells, dtype=np.float64):
         expected[b, :, : nz + 2 * z, : ny + 2 * y, : nx + 2 * x] = box
         active = (b, slice(None), slice(z, z + nz), slice(y, y + ny), slice(x, x + nx))
         field[active] = expected[active]
-    exchange = GhostExchange(blocks, copy)
+    exchange = GhostExchange(blocks, Team(1), copy)
     fresh = field.copy()
     for _ in range(2):  # the second time with used buffers
         field[:] = fresh

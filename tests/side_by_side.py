@@ -26,6 +26,7 @@ class SideBySide:
         self.calls, self.unlike, self.but_for = Counter(), Counter(), but_for
         self._build = cpu.build
         monkeypatch.setattr(cpu, "build", self.build)
+        monkeypatch.setattr(cpu.Team, "build", self.build)
 
     def build(self, drivers, constants, bindings=None, real="float64") -> SimpleNamespace:
         kernels = [Kernel(driver, constants, bindings or {}, real) for driver in drivers]

@@ -20,7 +20,7 @@ LAYERS = (
     {"errors", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
-ACROSS = {"kernels": "distfsi.device.markers"}
+ACROSS = {"kernels": "distfsi.device.markers", "mesh": "distfsi.device.seam"}
 
 ONLY_IN = {
     "numba": "device",

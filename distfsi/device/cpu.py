@@ -8,9 +8,12 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from copy import copy
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+
+import numpy as np
 
 from distfsi.device import emit, runtime
 from distfsi.device.cache import cache_directory, locked, write_whole
@@ -74,10 +77,12 @@ class _Compiled:
 
 
 class Team:
-    """Threads of one rank that share the items of a driver call.
+    """Threads of one rank that share the items of a driver call: the CPU as a device (device/seam.py).
 
     seconds: how long the calls have taken so far
     """
+
+    build = staticmethod(build)
 
     CHUNKS_PER_THREAD = 4
 
@@ -96,6 +101,36 @@ class Team:
         started = clock.perf_counter()
         self._share(function, count, *arguments)
         self.seconds += clock.perf_counter() - started
+
+    def run_few(self, function: Callable, count: int, *arguments) -> None:
+        """Call `function(0, count, *arguments)` on this thread."""
+        if count:
+            function(0, count, *arguments)
+
+    def array(self, host: np.ndarray) -> np.ndarray:
+        return host
+
+    def get(self, there: np.ndarray) -> np.ndarray:
+        return there
+
+    def put(self, there: np.ndarray, host: np.ndarray) -> None:
+        if there is not host:
+            there[...] = host
+
+    def take(self, host: np.ndarray, there: np.ndarray) -> None:
+        self.put(host, there)
+
+    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
+        return np.empty(count, dtype)
+
+    def beside(self) -> nullcontext:
+        return nullcontext()
+
+    def join(self) -> None:
+        pass
+
+    def finish_beside(self) -> None:
+        pass
 
     def _share(self, function: Callable, count: int, *arguments) -> None:
         if self._pool is None or count < 2:

@@ -134,7 +134,7 @@ def callees_first(
                 place(node.func.id)
         ordered[name] = functions[name]
 
-    for root in roots or [next(reversed(functions))]:
+    for root in [next(reversed(functions))] if roots is None else roots:
         place(root)
     return list(ordered.values())
 

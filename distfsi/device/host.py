@@ -12,13 +12,16 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from distfsi.device.cache import cache_directory, locked
 from distfsi.device.cuda_text import dtype_of
-from distfsi.device.kernel import Kernel, file_name
+from distfsi.device.gpu import Queue
+from distfsi.device.kernel import Kernel, Launch, file_name
 
 # No contraction of a * b + c, as on the GPU: the bits are those of the CPU's kernels.
 FLAGS = ("-std=c++20", "-O1", "-ffp-contract=off", "-fwrapv", "-fPIC", "-shared", "-w", "-x", "c++")
@@ -58,6 +61,89 @@ class HostKernel:
         name = self.kernel.name
         text = f"{self.kernel.text(arguments)}\nHOST_LAUNCH({name})\n"
         return getattr(ctypes.CDLL(str(library(name, text))), f"launch_{name}"), "__syncthreads" in text
+
+
+class HostArray:
+    """An array that only kernels and copies reach, as one on a GPU: it does not become a numpy array by itself."""
+
+    __array_ufunc__ = None
+
+    def __init__(self, memory: np.ndarray):
+        self.memory = memory
+
+    shape = property(lambda self: self.memory.shape)
+    dtype = property(lambda self: self.memory.dtype)
+    ndim = property(lambda self: self.memory.ndim)
+
+    def reshape(self, *shape: int) -> HostArray:
+        """The same values in another shape."""
+        return HostArray(self.memory.reshape(*shape, copy=False))
+
+    def __array__(self, *_, **__) -> np.ndarray:
+        raise TypeError("an array of the device: get() it")
+
+
+@dataclass
+class Task:
+    """Something queued, and what has to be done before it."""
+
+    work: Callable[[], None]
+    after: list[Task]
+    done: bool = False
+
+    def do(self) -> None:
+        """Do it, and before it what it needs."""
+        if not self.done:
+            self.done = True
+            for task in self.after:
+                task.do()
+            self.work()
+
+
+class HostRuntime:
+    """Runs kernels on the host, as late as their order allows or as early; both are legal on a GPU."""
+
+    def __init__(self, late: bool = True):
+        self.late = late
+        self._last = {queue: Task(lambda: None, [], done=True) for queue in Queue}
+        self._reverse = False
+
+    def compile(self, kernel: Kernel, arguments: Sequence[object]) -> HostKernel:
+        return HostKernel(kernel)
+
+    def launch(self, compiled: HostKernel, launch: Launch, count: int, arguments: Sequence, queue: Queue) -> None:
+        values = [argument.memory if isinstance(argument, HostArray) else argument for argument in arguments]
+        self._reverse = not self._reverse
+        self._add(queue, partial(compiled, count, values, self._reverse))
+
+    def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> HostArray:
+        memory = np.empty(shape, dtype)
+        memory.reshape(-1).view(np.uint8)[:] = 0xA5
+        return HostArray(memory)
+
+    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
+        return np.empty(count, dtype)
+
+    def upload(self, there: HostArray, host: np.ndarray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, there.memory, host))
+
+    def download(self, host: np.ndarray, there: HostArray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, host, there.memory))
+
+    def order(self, first: Queue, then: Queue) -> None:
+        self._last[then] = Task(lambda: None, [self._last[then], self._last[first]])
+
+    def synchronise(self, queue: Queue) -> None:
+        self._last[queue].do()
+
+    def is_idle(self, queue: Queue) -> bool:
+        """Whether all in the queue is done."""
+        return self._last[queue].done
+
+    def _add(self, queue: Queue, work: Callable[[], None]) -> None:
+        self._last[queue] = task = Task(work, [self._last[queue]])
+        if not self.late:
+            task.do()
 
 
 def parameters_of(argument: object) -> list[object]:

@@ -1,8 +1,14 @@
 """Copies of box-shaped regions of cells between flat arrays: ghost cells, message buffers, constants."""
 
-from distfsi.device.markers import driver
+from distfsi.device.markers import ByHand, driver
 
 
+def region_block(constants, arguments):
+    """The block's threads share the values of a region."""
+    return {"THREADS": 128, "SHARED": 0}
+
+
+@ByHand("regions.cu", (), region_block)
 @driver
 def copy_regions(first, last, table, destination, source, mirror):
     """Copy the regions of rows `first` to `last` (excluded) of `table` from flat array `source` to `destination`.

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from distfsi.device.seam import Device
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.regions import Regions
-
-Copy = Callable[[int, int, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
 
 
 class Messages:
@@ -27,29 +26,38 @@ class Messages:
         cells = np.append(0, np.cumsum(self.regions.volume))
         self.cells = cells[np.append(0, ends)]
 
-    def buffer(self, variables: int, dtype: np.dtype) -> Buffer:
+    def buffer(self, variables: int, dtype: np.dtype, device: Device) -> Buffer:
         """A buffer for all messages about a field of so many variables."""
-        values = np.empty(self.cells[-1] * variables, dtype=dtype)
+        values = device.pinned(int(self.cells[-1]) * variables, dtype)
         parts = [values[a:b] for a, b in pairwise((self.cells * variables).tolist())]
-        return Buffer(values, list(zip(self.ranks.tolist(), parts, strict=True)))
+        return Buffer(values, device.array(values), list(zip(self.ranks.tolist(), parts, strict=True)))
 
 
 @dataclass
 class Buffer:
-    """The flat `values` of all messages, and the part of it that is each rank's message."""
+    """The flat `values` of all messages on the host and on the device, and the part that is each rank's message."""
 
     values: np.ndarray
+    there: Any
     parts: list[tuple[int, np.ndarray]]
+
+
+@dataclass
+class Table:
+    """Regions to copy, on the device, and how many there are."""
+
+    count: int
+    there: Any
 
 
 @dataclass
 class Plan:
     """The tables and buffers to exchange fields of one number of variables and one dtype."""
 
-    local: np.ndarray
-    inflow: np.ndarray
-    pack: np.ndarray
-    unpack: np.ndarray
+    local: Table
+    inflow: Table
+    pack: Table
+    unpack: Table
     outgoing: Buffer
     incoming: Buffer
 
@@ -60,9 +68,9 @@ class GhostExchange:
     ready, waiting: local blocks whose ghosts are complete after `start`, and those that need `finish`.
     """
 
-    def __init__(self, blocks: Blocks, copy: Copy) -> None:
-        """`copy` is the compiled `kernels.regions.copy_regions`."""
-        self.blocks = blocks
+    def __init__(self, blocks: Blocks, device: Device, copy: Any) -> None:
+        """`copy`: `kernels.regions.copy_regions` as built by the device that holds the fields."""
+        self.blocks, self.device = blocks, device
         self._copy = copy
         self._world = blocks.communicator.world
         rank = blocks.communicator.rank
@@ -77,36 +85,44 @@ class GhostExchange:
         self.ready = np.setdiff1d(np.arange(blocks.local_count), self.waiting)
         self._plans: dict[tuple[int, np.dtype], Plan] = {}
 
-    def start(self, field: np.ndarray, mirror: np.ndarray, inflow: np.ndarray | None = None) -> None:
+    def start(self, field: Any, mirror: np.ndarray, inflow: np.ndarray | None = None) -> None:
         """Send what other ranks need of `field`, and fill the ghosts whose source is on this rank.
 
-        field   (local_count, variables, Z, Y, X), C-contiguous
+        field   (local_count, variables, Z, Y, X), C-contiguous, of the device
         mirror  (variables,) int64: axis whose reflection changes the variable's sign, -1 for none
         inflow  (3, 2, variables): constants per axis and side, needed where a boundary is an inflow
         """
-        plan = self._plan(field.shape[1], field.dtype)
-        flat = field.reshape(-1, copy=False)
+        plan, device = self._plan(field.shape[1], field.dtype), self.device
+        flat, mirror = field.reshape(-1), device.array(mirror)
+        device.finish_beside()  # the last exchange has read what it received
         self._requests = [self._world.Irecv(part, rank) for rank, part in plan.incoming.parts]
-        self._run(plan.pack, plan.outgoing.values, flat, mirror)
+        with device.beside():
+            self._run(plan.pack, plan.outgoing.there, flat, mirror)
+            device.take(plan.outgoing.values, plan.outgoing.there)
+        device.finish_beside()
         self._requests += [self._world.Isend(part, rank) for rank, part in plan.outgoing.parts]
         self._run(plan.local, flat, flat, mirror)
-        if len(plan.inflow):
-            self._run(plan.inflow, flat, np.ascontiguousarray(inflow, field.dtype).reshape(-1), mirror)
-        self._unpack = (plan.unpack, flat, plan.incoming.values, mirror)
+        if plan.inflow.count:
+            constants = device.array(np.ascontiguousarray(inflow, field.dtype).reshape(-1))
+            self._run(plan.inflow, flat, constants, mirror)
+        self._unpack = (plan, flat, mirror)
 
     def finish(self) -> None:
         """Wait for the messages and fill the remaining ghosts."""
+        plan, flat, mirror = self._unpack
         MPI.Request.Waitall(self._requests)
-        self._run(*self._unpack)
+        with self.device.beside():
+            self.device.put(plan.incoming.there, plan.incoming.values)
+            self._run(plan.unpack, flat, plan.incoming.there, mirror)
+        self.device.join()
 
     def traffic(self, field: np.ndarray) -> tuple[int, int]:
         """Bytes and messages that this rank sends in one exchange of `field`."""
         outgoing = self._plan(field.shape[1], field.dtype).outgoing
         return outgoing.values.nbytes, len(outgoing.parts)
 
-    def _run(self, table: np.ndarray, destination: np.ndarray, source: np.ndarray, mirror: np.ndarray) -> None:
-        if len(table):
-            self._copy(0, len(table), table, destination, source, mirror)
+    def _run(self, table: Table, destination: Any, source: Any, mirror: Any) -> None:
+        self.device.run_few(self._copy, table.count, table.there, destination, source, mirror)
 
     def _plan(self, variables: int, dtype: np.dtype) -> Plan:
         plan = self._plans.get((variables, dtype))
@@ -118,11 +134,15 @@ class GhostExchange:
         local, inflow = self._local, self._inflow
         out, into = self._outgoing.regions, self._incoming.regions
         in_field = partial(Regions.in_field, blocks=self.blocks, variables=variables)
+        tables = {
+            "local": local.table(in_field(local, end="block"), in_field(local, end="source")),
+            "inflow": inflow.table(in_field(inflow, end="block"), inflow.in_constants(variables)),
+            "pack": out.table(out.in_message(variables), in_field(out, end="source")),
+            "unpack": into.table(in_field(into, end="block"), into.in_message(variables), mirrored=False),
+        }
+        device = self.device
         return Plan(
-            local=local.table(in_field(local, end="block"), in_field(local, end="source")),
-            inflow=inflow.table(in_field(inflow, end="block"), inflow.in_constants(variables)),
-            pack=out.table(out.in_message(variables), in_field(out, end="source")),
-            unpack=into.table(in_field(into, end="block"), into.in_message(variables), mirrored=False),
-            outgoing=self._outgoing.buffer(variables, dtype),
-            incoming=self._incoming.buffer(variables, dtype),
+            **{name: Table(len(table), device.array(table)) for name, table in tables.items()},
+            outgoing=self._outgoing.buffer(variables, dtype, device),
+            incoming=self._incoming.buffer(variables, dtype, device),
         )

@@ -59,7 +59,7 @@ class Coupling:
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         self.kernels = cpu.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
         self.fluid_kernels = cpu.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
-        self.exchange = GhostExchange(blocks, cpu.build([copy_regions], {}).copy_regions)
+        self.exchange = GhostExchange(blocks, team, cpu.build([copy_regions], {}).copy_regions)
 
         h = min(scene.domain.spacing)
         self.cover_radius = COVER_RADIUS * max(h, 2.0 * max(body.spacing for body in scene.solid.bodies))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from distfsi.device import cpu
+from distfsi.device.seam import Device, Pair
 from distfsi.errors import Diverged
 from distfsi.kernels import fluid as kernels
 from distfsi.kernels.regions import copy_regions
@@ -43,22 +44,24 @@ class Fluid:
     step. stages: those that make a step.
     """
 
-    def __init__(self, scene: Scene, model, blocks: Blocks, team: cpu.Team):
+    def __init__(self, scene: Scene, model, blocks: Blocks, team: Device):
         self.model, self.blocks, self.team = model, blocks, team
         self.stages = SCHEMES[scene.time.scheme]
-        self.exchange = GhostExchange(blocks, cpu.build([copy_regions], {}).copy_regions)
+        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
         real = scene.fluid.precision
-        self.kernels = cpu.build(
+        self.kernels = team.build(
             [kernels.advance_tiles, kernels.fastest_signals], model.constants, model.bindings, real
         )
-        self._buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
+        buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
         initial = InitialState(scene.fluid, model)
         self.inflow = self._inflow_states(scene, initial)
-        for buffer in self._buffers:
+        for buffer in buffers:
             buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
-        initial.paint(blocks, self.state)
+        initial.paint(blocks, buffers[0])
+        self._buffers = [Pair(team, buffer) for buffer in buffers]
         self._lay_tiles(scene.performance.tile_cells)
-        self._fastest = np.zeros(blocks.local_count)
+        self._extent = team.array(blocks.extent)
+        self._fastest = Pair(team, np.zeros(blocks.local_count))
 
     def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
@@ -87,7 +90,8 @@ class Fluid:
         waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
         self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
-        self._through = np.zeros((len(self.tiles), 6, self.model.conserved))
+        self._table = self.team.array(self.tiles)
+        self._through = Pair(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
         self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
 
     def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
@@ -103,16 +107,16 @@ class Fluid:
 
     @property
     def state(self) -> np.ndarray:
-        return self._buffers[0]
+        return self._buffers[0].here()
 
     @property
     def previous(self) -> np.ndarray:
         """The state before the last step, until the next one begins."""
-        return self._buffers[1]
+        return self._buffers[1].here()
 
-    def input_of(self, stage: Stage) -> np.ndarray:
-        """The state that a stage starts from."""
-        return self._buffers[0] if stage.number == 0 else self._buffers[_output(stage.number - 1)]
+    def input_of(self, stage: Stage) -> Any:
+        """The state that a stage starts from, on the device."""
+        return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].there
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
@@ -122,10 +126,12 @@ class Fluid:
     def advance_stage(self, stage: Stage, dt: float) -> None:
         """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
         self.rest.begin_stage()
+        self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
         self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
         self.advance_tiles(self._ready_tiles, stage, dt)
         self.exchange.finish()
         self.advance_tiles(self._waiting_tiles, stage, dt)
+        self.rest.stages = self.team.get(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
             new = self._buffers.pop(_output(stage.number))
@@ -134,12 +140,12 @@ class Fluid:
     def advance_tiles(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
         """Advance the tiles of the given numbers by one stage; those that are calm only if their fluxes are booked."""
         tiles = tiles[~self.rest.calm[tiles] | (self.tiles[tiles, kernels.SIDES] > 0)]
-        output = self._buffers[_output(stage.number)]
+        output, chosen = self._buffers[_output(stage.number)], self.team.array(tiles)
         real = output.dtype.type
         rates = (real(dt / h) for h in self.blocks.grid.spacing)
         self.team.run(
-            self.kernels.advance_tiles, len(tiles), tiles, self.tiles, self.rest.calm, self.rest.stages,
-            self.state, self.input_of(stage), output, self._through,
+            self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
+            self._buffers[0].there, self.input_of(stage), output.there, self._through.there,
             real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
         )  # fmt: skip
 
@@ -153,14 +159,14 @@ class Fluid:
         finite state."""
         if not self.blocks.local_count:
             return 0.0
-        real = self.state.dtype.type
+        real = self._buffers[0].dtype.type
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiles[~self.rest.settled, kernels.BLOCK])
         self.team.run(
-            self.kernels.fastest_signals, len(changed), changed, self.state, self._first_active(),
-            self.blocks.extent, *inverse, self._fastest,
+            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].there,
+            self._first_active(), self._extent, *inverse, self._fastest.there,
         )  # fmt: skip
-        return float(np.max(self._fastest))
+        return float(np.max(self._fastest.here()))
 
     def _first_active(self) -> int:
         gx, gy, gz = self.blocks.grid.ghosts
@@ -177,13 +183,15 @@ class Fluid:
         """What a restart needs."""
         return {
             "cells": {"state": self.blocks.without_ghosts(self.state)},
-            "sums": {"through": self._through, "rested": self.rest.counts[None]},
+            "sums": {"through": self._through.here(), "rested": self.rest.counts[None]},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
-        self._through[:] = snapshot["sums"]["through"]
+        self._through.here()[:] = snapshot["sums"]["through"]
+        for pair in (self._buffers[0], self._through):
+            pair.changed()
         self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
         self.rest.wake()
 
@@ -218,7 +226,8 @@ class Fluid:
 
     def left_domain(self) -> np.ndarray:
         """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""
-        signed = self._through[:, 1::2].sum(axis=1) - self._through[:, 0::2].sum(axis=1)
+        through = self._through.here()
+        signed = through[:, 1::2].sum(axis=1) - through[:, 0::2].sum(axis=1)
         sums = np.zeros((self.blocks.local_count, self.model.conserved))
         np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)
         return self.blocks.sum(sums * self._cell_volume())

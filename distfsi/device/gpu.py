@@ -1,0 +1,128 @@
+"""A GPU as a device (device/seam.py), whatever holds its memory and runs its kernels: CUDA, or the host in tests."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import copy
+from enum import Enum
+from types import SimpleNamespace
+from typing import Any, Protocol
+
+import numpy as np
+
+from distfsi.device.fold import Bound
+from distfsi.device.kernel import Kernel, Launch
+
+
+class Queue(Enum):
+    """Where what is asked for waits its turn."""
+
+    MAIN = 0
+    BESIDE = 1
+
+
+class Runtime(Protocol):
+    """What runs kernels: device/cuda.py or device/host.py. All but `synchronise` returns at once."""
+
+    def compile(self, kernel: Kernel, arguments: Sequence[Any]) -> Any:
+        """The kernel for arguments like these."""
+
+    def launch(self, compiled: Any, launch: Launch, count: int, arguments: Sequence[Any], queue: Queue) -> None:
+        """Run the items 0 … count."""
+
+    def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
+        """An array."""
+
+    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
+        """Memory of the host that copies need not go around."""
+
+    def upload(self, there: Any, host: np.ndarray, queue: Queue) -> None:
+        """Copy from the host."""
+
+    def download(self, host: np.ndarray, there: Any, queue: Queue) -> None:
+        """Copy to the host."""
+
+    def order(self, first: Queue, then: Queue) -> None:
+        """What will be in the queue `then` waits for what is in the queue `first`."""
+
+    def synchronise(self, queue: Queue) -> None:
+        """Wait until all in the queue is done."""
+
+
+class Gpu:
+    """One GPU, used by one rank."""
+
+    def __init__(self, runtime: Runtime):
+        self.runtime, self.seconds = runtime, 0.0
+        self._queue = Queue.MAIN
+        self._compiled: dict[tuple, Any] = {}
+
+    def with_own_clock(self) -> Gpu:
+        """The same GPU, whose seconds are counted apart."""
+        gpu = copy(self)
+        gpu.seconds = 0.0
+        return gpu
+
+    def build(
+        self,
+        drivers: Iterable[Callable],
+        constants: Mapping[str, object],
+        bindings: Mapping[str, Bound] | None = None,
+        real: str = "float64",
+    ) -> SimpleNamespace:
+        """The drivers as kernels; each is compiled at its first call."""
+        return SimpleNamespace(**{d.__name__: Kernel(d, constants, bindings or {}, real) for d in drivers})
+
+    def run(self, kernel: Kernel, count: int, *arguments: Any) -> None:
+        if not count:
+            return
+        if any(isinstance(argument, np.ndarray) for argument in arguments):
+            raise TypeError(f"{kernel.name} gets an array of the host")
+        key = (id(kernel), *kernel.signature(arguments))
+        if key not in self._compiled:
+            self._compiled[key] = self.runtime.compile(kernel, arguments), kernel.launch(arguments), kernel
+        compiled, launch, _ = self._compiled[key]
+        self.runtime.launch(compiled, launch, count, arguments, self._queue)
+
+    run_few = run
+
+    def array(self, host: np.ndarray) -> Any:
+        there = self.runtime.empty(host.shape, host.dtype)
+        self.runtime.upload(there, host.copy(), self._queue)
+        return there
+
+    def get(self, there: Any) -> np.ndarray:
+        host = np.empty(there.shape, there.dtype)
+        self.runtime.download(host, there, self._queue)
+        self._wait(self._queue)
+        return host
+
+    def put(self, there: Any, host: np.ndarray) -> None:
+        self.runtime.upload(there, host, self._queue)
+
+    def take(self, host: np.ndarray, there: Any) -> None:
+        self.runtime.download(host, there, self._queue)
+
+    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
+        return self.runtime.pinned(count, dtype)
+
+    @contextmanager
+    def beside(self) -> Iterator[None]:
+        self.runtime.order(Queue.MAIN, Queue.BESIDE)
+        self._queue = Queue.BESIDE
+        yield
+        self._queue = Queue.MAIN
+
+    def join(self) -> None:
+        self.runtime.order(Queue.BESIDE, Queue.MAIN)
+
+    def finish_beside(self) -> None:
+        self._wait(Queue.BESIDE)
+
+    def _wait(self, queue: Queue) -> None:
+        """The host waits while the kernels run: that is the time they take, as far as it shows."""
+        started = clock.perf_counter()
+        self.runtime.synchronise(queue)
+        self.seconds += clock.perf_counter() - started

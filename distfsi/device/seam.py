@@ -1,0 +1,91 @@
+"""What a part may ask of the device that holds its arrays: the CPU (device/cpu.py), a GPU (device/gpu.py with
+device/cuda.py), or CUDA C on the host (device/gpu.py with device/host.py).
+
+A device has two queues. What is asked for is done in the order of asking, except for what is asked for `beside()`: that
+comes after all asked before, but only `join()` makes what is asked for later wait for it. On the CPU everything is done
+at once, and the arrays of the device are those of the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from types import SimpleNamespace
+from typing import Any, Protocol
+
+import numpy as np
+
+from distfsi.device.fold import Bound
+
+
+class Device(Protocol):
+    """`seconds`: how long its kernels have kept this rank busy."""
+
+    seconds: float
+
+    def with_own_clock(self) -> Device:
+        """The same device, whose seconds are counted apart."""
+
+    def build(
+        self,
+        drivers: Iterable[Callable],
+        constants: Mapping[str, object],
+        bindings: Mapping[str, Bound] | None = None,
+        real: str = "float64",
+    ) -> SimpleNamespace:
+        """The drivers, specialised for a scene, under their own names. Raises NotInSubset."""
+
+    def run(self, kernel: Any, count: int, *arguments: Any) -> None:
+        """Do the items 0 … count of a kernel; arrays among the arguments are the device's."""
+
+    def run_few(self, kernel: Any, count: int, *arguments: Any) -> None:
+        """`run`, for items that are not worth sharing among threads."""
+
+    def array(self, host: np.ndarray) -> Any:
+        """An array of the device with the values of a contiguous one of the host; on the CPU that array itself."""
+
+    def get(self, there: Any) -> np.ndarray:
+        """The values of an array of the device, when all that was asked for before is done."""
+
+    def put(self, there: Any, host: np.ndarray) -> None:
+        """Give an array of the device the values of one of the host, which must stay as it is until that is done."""
+
+    def take(self, host: np.ndarray, there: Any) -> None:
+        """Give an array of the host the values of one of the device; they are there after `finish_beside`."""
+
+    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
+        """Memory of the host for `put` and `take`."""
+
+    def beside(self) -> AbstractContextManager[None]:
+        """What is asked for inside goes to the other queue."""
+
+    def join(self) -> None:
+        """What is asked for later waits for what was asked for beside."""
+
+    def finish_beside(self) -> None:
+        """Wait until all that was asked for beside is done."""
+
+
+class Pair:
+    """An array of the device and, when it is looked at, its copy on the host."""
+
+    def __init__(self, device: Device, host: np.ndarray):
+        self._device, self._there = device, device.array(host)
+        self.dtype, self.nbytes = host.dtype, host.nbytes
+        self._host: np.ndarray | None = None
+
+    @property
+    def there(self) -> Any:
+        """The device's array, for a kernel that may write into it."""
+        self._host = None
+        return self._there
+
+    def here(self) -> np.ndarray:
+        """The values on the host. Who changes them calls `changed`."""
+        if self._host is None:
+            self._host = self._device.get(self._there)
+        return self._host
+
+    def changed(self) -> None:
+        """The values on the host have been changed."""
+        self._device.put(self._there, self.here())

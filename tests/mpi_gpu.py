@@ -1,0 +1,166 @@
+"""Run by test_gpu.py on 1 and 2 ranks: fluid scenes on the CPU and on CUDA C that the host runs, with the same bits."""
+
+from __future__ import annotations
+
+import sys
+from itertools import cycle
+
+import numpy as np
+
+from distfsi.device.cpu import Team
+from distfsi.device.gpu import Gpu, Queue
+from distfsi.device.host import HostRuntime
+from distfsi.errors import Diverged
+from distfsi.mesh.communicator import Communicator, install_abort_on_exception
+from distfsi.scene.description import Ball, FluidState, HalfSpace, Performance, Region
+from distfsi.simulation import Simulation
+from fluids import MATERIALS
+from tubes import scene_of
+
+SCENES = {
+    "tube": (("air",), 1, {}),
+    "bubble": (("air", "helium"), 2, {"riemann": "adaptive"}),
+    "bubble, float32": (("air", "helium"), 2, {"precision": "float32"}),
+}
+STEPS = 4
+
+
+def scene(names, dimensions, **method):
+    """A shock that meets a bubble, between symmetry planes, an outflow and a wall."""
+    D = dimensions
+    still = FluidState(0, 1.0, 1.0, (0.0,) * D)
+    shocked = FluidState(0, 2.0, 4.0, (1.0,) + (0.0,) * (D - 1))
+    bubble = FluidState(len(names) - 1, 0.2, 1.0, (0.0,) * D)
+    cells, performance = ((64,), ((16,), (16,))) if D == 1 else ((48, 20), ((16, 8), (8, 8)))
+    return scene_of(
+        tuple(MATERIALS[name] for name in names),
+        (
+            Region(still, None),
+            Region(bubble, Ball((0.5,) * D, 0.2)),
+            Region(shocked, HalfSpace((0.25,) + (0.0,) * (D - 1), (1.0,) + (0.0,) * (D - 1))),
+        ),
+        (0.0,) * D,
+        tuple(0.05 * n for n in cells),
+        cells,
+        100.0,
+        boundaries=(("outflow", "wall"), ("symmetry", "symmetry"))[:D],
+        performance=Performance(*performance),
+        **method,
+    )
+
+
+def result(name, device):
+    """State, time and books after some steps; and the state that a restart brings back, one step later."""
+    names, dimensions, method = SCENES[name]
+    simulation = Simulation.of(scene(names, dimensions, **method), Communicator(), device=device)
+    fluid, messenger = simulation.fluid, None
+    if isinstance(device, Gpu):
+        fluid.exchange._world = messenger = Messenger(fluid.exchange._world, device.runtime)
+    for _ in range(STEPS):
+        simulation.step()
+        fluid.exchange_ghosts(fluid.stages[0])
+        fluid.exchange_ghosts(fluid.stages[0])
+    cells = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
+    kept = {name: {k: v.copy() for k, v in values.items()} for name, values in fluid.snapshot().items()}
+    books = [*fluid.totals(), fluid.left_domain(), np.array([simulation.time, fluid.share_at_rest()])]
+    simulation.step()
+    fluid.restore(kept)
+    again = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
+    return [*cells, *books, *again, np.array([messenger.too_early if messenger else 0])]
+
+
+def same(results, expected):
+    """Whether all ranks have the same bits."""
+    mine = all(a.tobytes() == b.tobytes() for a, b in zip(results, expected, strict=True))
+    return all(Communicator().allgather(mine))
+
+
+class Messenger:
+    """The communicator of a ghost exchange: it counts the messages that the device may still work on."""
+
+    def __init__(self, world, runtime):
+        self._world, self._runtime, self.too_early = world, runtime, 0
+
+    def Isend(self, *arguments):
+        return self._watched(self._world.Isend, arguments)
+
+    def Irecv(self, *arguments):
+        return self._watched(self._world.Irecv, arguments)
+
+    def _watched(self, message, arguments):
+        self.too_early += not self._runtime.is_idle(Queue.BESIDE)
+        return message(*arguments)
+
+
+def check_scenes():
+    """Every scene, with everything done as late as its order allows, and as early."""
+    for name in SCENES:
+        expected = result(name, Team(1))
+        for late in (True, False):
+            assert same(result(name, Gpu(HostRuntime(late))), expected), (name, late)
+        print(f"{name}: same bits")
+
+
+def nothing(*_, **__):
+    """In the place of something that is needed."""
+
+
+def check_mutants():
+    """Without one of the waits, copies and orders something comes out otherwise, or a message goes too early."""
+    expected = result("bubble", Team(1))
+    for name, take_away in MUTANTS.items():
+        gpu = Gpu(HostRuntime())
+        gpu.with_own_clock = lambda gpu=gpu: gpu
+        take_away(gpu)
+        try:
+            found = not same(result("bubble", gpu), expected)
+        except Diverged:  # on all ranks
+            found = True
+        assert found, name
+        print(f"without {name}: found")
+
+
+def without(name):
+    """Takes a method of the device away."""
+    return lambda gpu: setattr(gpu, name, lambda *_: None)
+
+
+def without_wait(turn):
+    """Takes every other wait away."""
+
+    def take_away(gpu):
+        wait, turns = gpu.finish_beside, cycle((turn == 0, turn == 1))
+        gpu.finish_beside = lambda: None if next(turns) else wait()
+
+    return take_away
+
+
+def without_order(queue):
+    """Takes the waits of a queue for the other one away."""
+
+    def take_away(gpu):
+        order = gpu.runtime.order
+        gpu.runtime.order = lambda first, then: None if then is queue else order(first, then)
+
+    return take_away
+
+
+def without_wait_of_get(gpu):
+    """The host looks at once."""
+    gpu._wait = lambda queue: gpu.runtime.synchronise(queue) if queue is Queue.BESIDE else None
+
+
+MUTANTS = {
+    "the wait before receiving": without_wait(0),
+    "the wait before sending": without_wait(1),
+    "the copy of what is sent": without("take"),
+    "the copy of what came": without("put"),
+    "the wait for the ghosts": without_order(Queue.MAIN),
+    "the wait for the cells": without_order(Queue.BESIDE),
+    "the wait before looking": without_wait_of_get,
+}
+
+
+if __name__ == "__main__":
+    install_abort_on_exception(Communicator())
+    {"scenes": check_scenes, "mutants": check_mutants}[sys.argv[1]]()
