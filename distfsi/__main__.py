@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("input", help="the scene, a TOML file")
         _add_overrides(command)
     run.add_argument("--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)")
+    run.add_argument("--gpu", action="store_true", help="compute on the node's GPUs; for scenes without solids")
     run.add_argument(
         "--restart",
         metavar="auto|FILE",
@@ -120,7 +121,7 @@ def run(arguments: argparse.Namespace) -> None:
     communicator = _start_ranks()
     with _telling_once(communicator):
         scene = _load_once(load, arguments, communicator)
-        simulation.run(scene, communicator, arguments.threads, arguments.restart)
+        simulation.run(scene, communicator, arguments.threads, arguments.restart, arguments.gpu)
 
 
 def check(arguments: argparse.Namespace) -> None:

@@ -15,8 +15,10 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from distfsi.device.cpu import Team
+from distfsi.device.cuda import NoGpu, gpu_of
+from distfsi.device.nvrtc import CompileError
 from distfsi.device.seam import Device
-from distfsi.errors import Diverged, Stopped
+from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
@@ -244,10 +246,33 @@ def threads_of_rank(communicator: Communicator) -> int:
     return max(1, len(own[1]) // communicator.allgather(own).count(own))
 
 
-def run(scene: Scene, communicator: Communicator, threads: int | None = None, restart: str | None = None) -> Simulation:
+def gpu_of_rank(scene: Scene, communicator: Communicator) -> Device:
+    """Collective. The GPU on which this rank computes the scene. Raises InputError on all ranks where it cannot."""
+    gpu, faults = None, []
+    if scene.solid or scene.output.peaks:
+        faults.append("--gpu: solids and peaks are computed on the CPU only; run without --gpu")
+    else:
+        try:
+            gpu = gpu_of(communicator.local_rank)
+        except (NoGpu, CompileError) as error:
+            faults.append(f"--gpu: {error}")
+    faults = [fault for others in communicator.allgather(faults) for fault in others]
+    if faults:
+        raise InputError(sorted(set(faults)))
+    return gpu
+
+
+def run(
+    scene: Scene,
+    communicator: Communicator,
+    threads: int | None = None,
+    restart: str | None = None,
+    on_gpu: bool = False,
+) -> Simulation:
     """Run the scene to its end, writing fields, history, restart files and a picture into its output directory.
 
     `restart`: a restart file to go on from, or "auto": the newest in the output directory; without one from the start.
+    `on_gpu`: compute on the node's GPUs, rank by rank, in the place of threads.
     Raises on all ranks: InputError for a restart file of another scene, OutputError, Diverged, and Stopped when a
     signal, the stop file or the wall-clock limit has ended the run early.
     """
@@ -262,10 +287,10 @@ def run(scene: Scene, communicator: Communicator, threads: int | None = None, re
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)
-    costs = None
+    costs, device = None, gpu_of_rank(scene, communicator) if on_gpu else None
     with requests, closing(progress), threadpool_limits(1), journal:
         while True:
-            simulation = Simulation.of(scene, communicator, threads, costs)
+            simulation = Simulation.of(scene, communicator, threads, costs, device)
             simulation.asked = requests.strongest
             accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
             records = Records(simulation, accounts, files, origin)

@@ -102,6 +102,9 @@ class Team:
         self._share(function, count, *arguments)
         self.seconds += clock.perf_counter() - started
 
+    def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
+        return wanted
+
     def run_few(self, function: Callable, count: int, *arguments) -> None:
         """Call `function(0, count, *arguments)` on this thread."""
         if count:

@@ -15,6 +15,9 @@ import numpy as np
 from distfsi.device.fold import Bound
 from distfsi.device.kernel import Kernel, Launch
 
+TILE_CELLS = ((256,), (32, 8), (16, 8, 16))
+MOST_THREADS = 256
+
 
 class Queue(Enum):
     """Where what is asked for waits its turn."""
@@ -64,6 +67,10 @@ class Gpu:
         gpu = copy(self)
         gpu.seconds = 0.0
         return gpu
+
+    def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
+        fits = np.prod(wanted[:2]) <= MOST_THREADS  # one thread per column along the third axis
+        return wanted if fits else TILE_CELLS[len(wanted) - 1]
 
     def build(
         self,

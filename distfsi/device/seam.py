@@ -26,6 +26,9 @@ class Device(Protocol):
     def with_own_clock(self) -> Device:
         """The same device, whose seconds are counted apart."""
 
+    def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
+        """Cells of a tile of the fluid that suit the device, where `wanted` suits the CPU."""
+
     def build(
         self,
         drivers: Iterable[Callable],

@@ -59,7 +59,7 @@ class Fluid:
             buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
         self._buffers = [Pair(team, buffer) for buffer in buffers]
-        self._lay_tiles(scene.performance.tile_cells)
+        self._lay_tiles(team.tile_cells(scene.performance.tile_cells))
         self._extent = team.array(blocks.extent)
         self._fastest = Pair(team, np.zeros(blocks.local_count))
 
