@@ -84,7 +84,7 @@ def kernel_text(
     names = [argument.arg for argument in tree.args.args[2:]]
     values = [value_of(safe(name), argument) for name, argument in zip(names, arguments, strict=True)]
     shell = (
-        f'extern "C" __global__ void __launch_bounds__(THREADS)\n'
+        f'extern "C" __global__ void __launch_bounds__(THREADS, 1)\n'
         f"{driver.__name__}_kernel({parameters(names, arguments)})\n"
         f"{{\n    {driver.__name__}({', '.join(['integer(begin)', 'integer(end)', *values])});\n}}"
     )

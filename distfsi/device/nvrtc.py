@@ -10,6 +10,10 @@ import ctypes.util
 import importlib.util
 import os
 import re
+import shutil
+import subprocess
+import tempfile
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -86,6 +90,45 @@ def cubin(name: str, text: str, architecture: str) -> Path:
         with locked(path):
             write_whole(path, compile_text(text, architecture)[0])
     return path
+
+
+INSTRUCTIONS = {  # of the machine, by the first letters of their names
+    "float64": ("DADD", "DMUL", "DFMA", "DSETP", "DMNMX"),
+    "float32": ("FADD", "FMUL", "FFMA", "FSETP", "FMNMX", "FCHK"),
+    "roots and reciprocals": ("MUFU",),
+    "selects": ("FSEL", "SEL"),
+    "global memory": ("LDG", "STG", "LD.", "ST."),
+    "shared memory": ("LDS", "STS"),
+    "local memory": ("LDL", "STL"),
+    "moves": ("MOV", "IMAD.MOV", "UMOV"),
+    "integers": ("IMAD", "IADD", "ISETP", "LEA", "LOP3", "SHF", "IABS", "UIMAD", "UIADD", "USHF", "ULEA", "ULOP3"),
+    "branches": ("BRA", "CALL", "RET", "BSSY", "BSYNC", "EXIT", "BAR"),
+}
+
+
+def instructions(code: bytes) -> dict[str, int]:
+    """How many instructions of each class machine code holds, loops counted once. Raises CompileError."""
+    with tempfile.NamedTemporaryFile(suffix=".cubin") as file:
+        file.write(code)
+        file.flush()
+        done = subprocess.run([_disassembler(), "-c", file.name], capture_output=True, text=True)
+    if done.returncode:
+        raise CompileError(done.stderr)
+    names = re.findall(r"/\*[0-9a-f]{4,}\*/\s+(?:@!?U?P\w+\s+)?([A-Z][\w.]*)", done.stdout)
+    kinds = [next((k for k, first in INSTRUCTIONS.items() if name.startswith(first)), "others") for name in names]
+    counted = Counter(kinds)
+    return {kind: counted[kind] for kind in (*INSTRUCTIONS, "others")}
+
+
+def _disassembler() -> str:
+    spec = importlib.util.find_spec("nvidia")
+    for root in spec.submodule_search_locations if spec else ():
+        for path in Path(root).glob("*/bin/nvdisasm"):
+            return str(path)
+    found = shutil.which("nvdisasm")
+    if found is None:
+        raise CompileError("nvdisasm is not found; pip install nvidia-cuda-nvdisasm")
+    return found
 
 
 def usage(log: str) -> dict[str, int]:

@@ -127,7 +127,9 @@ DEVICE void book(double *through, const real *F, int axis, int step, int n, int 
     for (int v = threadIdx.x; v < CONSERVED; v += THREADS) {
         const real *values = F + place(v, axis) * FACES;
         real total = values[0];
+#pragma unroll 1
         for (int i = 1; i < n; i++) total = total + values[i * step];
+#pragma unroll 1
         for (int row = 0; row < rows; row++) through[v] += total * weight;
     }
 }
@@ -135,7 +137,7 @@ DEVICE void book(double *through, const real *F, int axis, int step, int n, int 
 // columns of the tile table
 enum { BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES };
 
-extern "C" __global__ void __launch_bounds__(THREADS) advance_tiles_kernel(PARAMETERS)
+extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PARAMETERS)
 {
     DYNAMIC_SHARED(shared);
     real *P = (real *)shared, *F = P + VARIABLES * SP;
@@ -244,7 +246,7 @@ extern "C" __global__ void __launch_bounds__(THREADS) advance_tiles_kernel(PARAM
 
 // ---- the fastest signal -----------------------------------------------------------------------------------------------
 
-extern "C" __global__ void __launch_bounds__(THREADS) fastest_signals_kernel(PARAMETERS)
+extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(PARAMETERS)
 {
     __shared__ real largest[THREADS];
     const real rates[3] = {rx, ry, rz};

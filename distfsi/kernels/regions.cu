@@ -1,6 +1,6 @@
 // copy_regions of kernels/regions.py for a GPU: one block of threads per region.
 
-extern "C" __global__ void __launch_bounds__(THREADS) copy_regions_kernel(PARAMETERS)
+extern "C" __global__ void __launch_bounds__(THREADS, 1) copy_regions_kernel(PARAMETERS)
 {
     const long long *region = table + (begin + blockIdx.x) * table_1;
     const long long nx = region[0], ny = region[1], nz = region[2], flips = region[3], cells = nx * ny * nz;

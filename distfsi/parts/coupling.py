@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.device import cpu
+from distfsi.device.cpu import Team
 from distfsi.kernels import coupling as kernels
 from distfsi.kernels import solid as particle_kernels
 from distfsi.kernels.regions import copy_regions
@@ -53,13 +53,13 @@ class Coupling:
 
     causes = ("wall", "covered", "fresh", "sides")
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: cpu.Team):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Team):
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
-        self.kernels = cpu.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
-        self.fluid_kernels = cpu.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
-        self.exchange = GhostExchange(blocks, team, cpu.build([copy_regions], {}).copy_regions)
+        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
+        self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
+        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
 
         h = min(scene.domain.spacing)
         self.cover_radius = COVER_RADIUS * max(h, 2.0 * max(body.spacing for body in scene.solid.bodies))

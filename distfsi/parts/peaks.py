@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from distfsi.device import cpu
 from distfsi.kernels import peaks as kernels
 from distfsi.mesh.blocks import Snapshot
 from distfsi.parts.coupling import Coupling
@@ -32,7 +31,7 @@ class Peaks:
         self.peaks, self.fluid, self.coupling = peaks, fluid, coupling
         model, blocks = fluid.model, fluid.blocks
         real = fluid.state.dtype.name
-        self.kernels = cpu.build([kernels.remember_peaks], model.constants, model.bindings, real)
+        self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
         self.fields = blocks.allocate(len(NAMES))
         self.fields[:, kernels.ARRIVAL] = np.inf
         self._kind = coupling.kind if coupling else blocks.allocate(1, np.uint8)

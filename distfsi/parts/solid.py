@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from distfsi.device import cpu
+from distfsi.device.cpu import Team
 from distfsi.device.emit import plain
 from distfsi.errors import Diverged
 from distfsi.kernels import material
@@ -54,7 +54,7 @@ class Solid:
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
 
-    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: cpu.Team):
+    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Team):
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = scene.domain.dimensions
         self.gravity = np.array(scene.gravity)
@@ -70,7 +70,7 @@ class Solid:
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
             "ZERO_ENERGY": scene.solid.zero_energy,
         } | self.materials.constants
-        self.kernels = cpu.build(DRIVERS, constants)
+        self.kernels = team.build(DRIVERS, constants)
         self._von_mises = plain(von_mises, constants)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
         self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(self.kernels, team, search, self.dimensions)
