@@ -24,6 +24,7 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "exact cases",
     "frontier fluid",
     "stability fluid",
+    "kernels",
 )
 
 

@@ -1,10 +1,19 @@
 """A fluid on a GPU's queues and memory, which the host stands in for: the bits of the CPU on any number of ranks."""
 
+import sys
+
 import numpy as np
 import pytest
 
+import fake_cupy
+import mpi_gpu
+from distfsi.device import cuda, host
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostArray, HostRuntime
+from distfsi.errors import InputError
+from distfsi.mesh.communicator import Communicator
+from distfsi.scene import load
+from distfsi.simulation import Simulation, gpu_of_rank
 from launch import ROOT
 
 SCRIPT = ROOT / "tests/mpi_gpu.py"
@@ -26,3 +35,43 @@ def test_arrays_of_the_device_stay_there():
     for misuse in (np.asarray, np.sum, lambda a: a + 1.0, lambda a: np.zeros(3) + a):
         with pytest.raises(TypeError):
             misuse(array)
+
+
+# ---- CuPy ------------------------------------------------------------------------------------------------------------
+
+
+def on_the_host(name, text, architecture):
+    """In the place of machine code: a library of the host."""
+    assert architecture == "sm_90"
+    return host.library(name, f"{text}\nHOST_LAUNCH({name})\n")
+
+
+def test_the_calls_of_cupy(monkeypatch):
+    """A whole fluid by way of device/cuda.py, with CuPy replaced: the bits of the CPU."""
+    fake_cupy.install(monkeypatch)
+    monkeypatch.setattr(cuda.nvrtc, "cubin", on_the_host)
+    scene = mpi_gpu.scene(("air", "helium"), 2, riemann="adaptive")
+    results = []
+    for device in (None, cuda.gpu_of(3)):
+        simulation = Simulation.of(scene, Communicator(), 1, device=device)
+        for _ in range(3):
+            simulation.step()
+        results.append(simulation.fluid.state)
+    assert np.array_equal(*results)
+    assert all(fake_cupy.calls[name] > 9 for name in ("set", "get", "launch", "synchronize"))
+
+
+def test_a_rank_without_gpu_says_why(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cupy", None)
+    with pytest.raises(cuda.NoGpu, match="CuPy is not installed"):
+        cuda.gpu_of(0)
+    fake_cupy.install(monkeypatch, gpus=0)
+    with pytest.raises(cuda.NoGpu, match="no GPU is visible"):
+        cuda.gpu_of(0)
+
+
+@pytest.mark.parametrize("path", ["inputs/steel_tube.toml", "inputs/sod.toml"])
+def test_a_run_that_gpus_cannot_do_is_refused(monkeypatch, path):
+    monkeypatch.setitem(sys.modules, "cupy", None)
+    with pytest.raises(InputError, match="solids and peaks" if "tube" in path else "CuPy is not installed"):
+        gpu_of_rank(load(ROOT / path), Communicator())

@@ -142,7 +142,7 @@ def rows(name: str, dimensions: int, kernels: list[tuple[Kernel, list[Any]]]) ->
 
 
 def bytes_per_cell(dimensions: int, variables: int, real: str) -> float:
-    """Bytes that a stage moves per cell if all that a tile reads comes from memory once: U with its ghosts, U_n, U_new."""
+    """Bytes that a stage moves per cell if a tile reads and writes everything once: U with ghosts, U_n, U_new."""
     gpu = Gpu(Survey())
     tile = np.array(gpu.tile_cells((4096,) * dimensions))
     ghosts = float(((tile + 4) / tile).prod())
