@@ -312,7 +312,7 @@ class Body:
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
-    `zero_energy`: the stiffness of bonds against what no deformation gradient sees, in longitudinal moduli.
+    `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli.
     """
 
     bodies: tuple[Body, ...]
@@ -321,7 +321,7 @@ class Solid:
     viscosity_beta: float
     objective_rate: ObjectiveRate = "jaumann"
     form: SolidForm = "total_lagrangian"
-    zero_energy: float = 0.1
+    zero_energy: float = 4.0 / 3.0
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

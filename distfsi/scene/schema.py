@@ -149,8 +149,8 @@ class SolidInput(Table):
     smoothing: quantity("1", ge=1.0, le=3.0) = Field(1.3, description="smoothing length over particle spacing")
     viscosity_alpha: quantity("1", ge=0.0) = Field(1.0, description="linear artificial viscosity")
     viscosity_beta: quantity("1", ge=0.0) = Field(2.0, description="quadratic artificial viscosity")
-    zero_energy: quantity("1", ge=0.0, le=1.0) = Field(
-        0.1, description="stiffness of bonds against zero-energy modes, in longitudinal moduli"
+    zero_energy: quantity("1", ge=0.0, le=5.0) = Field(
+        4.0 / 3.0, description="stiffness of bonds against zero-energy modes, in shear moduli"
     )
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
