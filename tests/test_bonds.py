@@ -10,13 +10,15 @@ from distfsi.scene.description import (
     Ball,
     Box,
     Elastic,
+    HalfSpace,
     JohnsonCookFailure,
     LinearEos,
     NoStrength,
     PerfectlyPlastic,
     Scatter,
+    Tube,
 )
-from mpi_solid import COPPER_EOS, body, solid, step
+from mpi_solid import COPPER_EOS, body, bursting_ball, digest, solid, step
 
 RUBBER_EOS, RUBBER = LinearEos(3.25e6), Elastic(0.7e6)
 
@@ -252,3 +254,84 @@ def test_a_spinning_disc_that_bursts_keeps_its_angular_momentum():
     assert np.allclose(part.totals()["momentum"], momentum, rtol=0.0, atol=1e-11 * spin)
     assert c["energy"].min() > -1.0  # debris is not thrown out by springs that were never pressed
     assert np.all(c["density"] > 950.0)
+
+
+def test_rubber_rings_meet_part_and_do_not_break():
+    speed, spacing = 0.059 * 57.03, 0.0025
+    rings = [
+        body(Tube((side * 0.0415, 0.0), 0.03, 0.04), spacing, 1000.0, (-side * speed, 0.0), RUBBER_EOS, RUBBER)
+        for side in (-1.0, 1.0)
+    ]
+    part = total_lagrangian(rings, (-0.15, -0.15), (0.15, 0.15), block_cells=16)
+    before, time, closest = energy(part), 0.0, math.inf
+
+    def of(ring):
+        return part.columns["body"] == ring
+
+    while time < 0.022:
+        time += step(part)[0]
+        x = part.columns["position"][:, 0]
+        gap = x[of(1)].min() - x[of(0)].max()
+        closest = min(closest, gap)
+    c = part.columns
+    away = (c["mass"] * c["velocity"][:, 0])[of(1)].sum() / c["mass"][of(1)].sum()
+    assert 0.8 * spacing < closest < spacing
+    assert gap > 2.0 * spacing
+    assert 0.7 * speed < away < speed
+    assert len(part.pieces()["piece"]) == 2
+    assert energy(part) == pytest.approx(before, rel=1e-12)
+    assert np.abs(part.totals()["momentum"]).max() < 1e-12 * part.totals()["mass"] * speed
+
+
+def half_period_of_a_cantilever(across):
+    """Gray, Monaghan & Swift 2001: how long a clamped plate, set swinging in its first mode, takes to be straight."""
+    length, height, density = 0.2, 0.02, 1000.0
+    E, nu, spacing = 2e6, 0.3975, 0.02 / across
+    elastic = (LinearEos(E / 3.0 / (1.0 - 2.0 * nu)), Elastic(E / 2.0 / (1.0 + nu)))
+    box, clamp = Box((-4.0 * spacing, -0.5 * height), (length, 0.5 * height)), HalfSpace((0.0, 0.0), (1.0, 0.0))
+    plate = body(box, spacing, density, (0.0, 0.0), *elastic, fixed=clamp)
+    part = total_lagrangian([plate], (-0.1, -0.1), (0.3, 0.1), block_cells=16)
+
+    def shape(x, kl=1.875104):
+        z = kl * x / length
+        return (np.cos(kl) + np.cosh(kl)) * (np.cosh(z) - np.cos(z)) + (np.sin(kl) - np.sinh(kl)) * (
+            np.sinh(z) - np.sin(z)
+        )
+
+    c = part.columns
+    c["velocity"][:, 1] = np.where(c["fixed"], 0.0, 0.57 * shape(c["position"][:, 0]) / shape(length))
+    end = c["id"][np.argmax(c["position"] @ [1.0, 0.1])]
+    time, deflection = 0.0, 0.0
+    while True:
+        dt = step(part)[0]
+        row = np.flatnonzero(part.columns["id"] == end)[0]
+        before, deflection = deflection, (part.columns["position"] - part.columns["reference"])[row, 1]
+        time += dt
+        if deflection < 0.0:
+            return time - dt * deflection / (deflection - before)
+
+
+def test_a_coarse_cantilever_swings():
+    assert 2.0 * half_period_of_a_cantilever(5) == pytest.approx(0.2565, rel=0.06)
+
+
+@pytest.mark.full
+def test_a_cantilever_swings_with_timoshenkos_period():
+    coarse, fine = (2.0 * half_period_of_a_cantilever(across) for across in (10, 20))
+    assert coarse == pytest.approx(0.2565, rel=0.02)
+    assert fine == pytest.approx(0.2565, rel=0.01)
+    assert abs(fine - 0.2565) < 0.5 * abs(coarse - 0.2565)
+
+
+def test_a_restart_goes_on_to_the_same_bits():
+    part, _ = bursting_ball(1)
+    for _ in range(60):
+        step(part)
+    snapshot = {kind: {k: v.copy() for k, v in values.items()} for kind, values in part.snapshot().items()}
+    again, _ = bursting_ball(1)
+    again.restore(snapshot)
+    for each in (part, again):
+        for _ in range(20):
+            step(each)
+    assert (part.columns["bond_count"] == 0).any()
+    assert digest(part) == digest(again)
