@@ -209,13 +209,14 @@ class Solid:
 
     @property
     def around(self) -> dict[str, np.ndarray]:
-        """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, h, key."""
+        """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, volume, h, key."""
         s, v = self._near.state, kernels.VELOCITY
         scalars = {"mass": kernels.MASS, "density": kernels.DENSITY, "h": kernels.SMOOTHING}
         return {
             "position": self._near.position,
             "velocity": np.ascontiguousarray(s[:, v : v + self.dimensions]),
             "key": self._near.plan.key,
+            "volume": s[:, kernels.MASS] / s[:, kernels.DENSITY],
         } | {name: np.ascontiguousarray(s[:, column]) for name, column in scalars.items()}
 
     def check(self, time: float) -> None:
