@@ -22,7 +22,7 @@ from distfsi.physics.bonds import (
 from distfsi.physics.pair import gradient_correction
 from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
+from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
 from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, trace
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
@@ -141,11 +141,14 @@ def cut(begin, end, position, reference, failed, loose, key, bond_count, partner
 
 @driver
 def stress_bonds(
-    begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, tension
-):
-    """tension[i] = stiffness and bond stress of particle i."""
+    begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, damage,
+    tension,
+):  # fmt: skip
+    """tension[i] = stiffness and bond stress of particle i. What has cracked resists no strain, seen or unseen."""
     for i in range(begin, end):
         kappa = zero_energy_stiffness(density[i], sound[i], strain[i], strength[body[i], 0], strength[body[i], 1])
+        if FAILS:
+            kappa = kappa * (1.0 - damage[i])
         S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
         stress = bond_stress(S, pressure[i] + viscous[i], matrix_of(deformation, i), matrix_of(correction, i), kappa)
         tension[i, STIFFNESS] = kappa

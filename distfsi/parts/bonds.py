@@ -192,7 +192,8 @@ class TotalLagrangian:
         D, n = self._dimensions, len(c["id"])
         tension = np.empty((n, 1 + D + D * D))
         material = [c[name] for name in MATERIAL]
-        self._run(n, "stress_bonds", c["body"], self._strength, *material, c["correction"], c["deformation"], tension)
+        material += [c["correction"], c["deformation"], c.get("damage", np.empty(0))]
+        self._run(n, "stress_bonds", c["body"], self._strength, *material, tension)
         tension[c["loose"] > 0] = 0.0  # its bonds no longer determine its strain
         tension[:, 1 : 1 + D] = c["position"] - c["reference"]
         return tension

@@ -38,6 +38,7 @@ from distfsi.scene.description import (
 
 ROOM_TEMPERATURE = 293.15  # K, of materials that do not know their own
 NOT_CONCRETE = (0.0,) * 20
+CRACK_WIDTH = 2.0  # spacings: a bond is cut when both its ends have failed, so a crack has two rows of particles
 NO_FAILURE = (math.inf, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0)
 
 
@@ -154,7 +155,7 @@ def _rate_independent(shear_modulus: float, yield_stress: float, hardening: floa
 
 
 def failure_constants(failure: Failure | None, size: float) -> tuple[float, ...]:
-    """D1 … D5, reference rate, tensile strength, fracture energy, size of a particle [m]: see physics/damage.py."""
+    """D1 … D5, reference rate, tensile strength, fracture energy, width of a crack [m]: see physics/damage.py."""
     match failure:
         case None:
             return *NO_FAILURE, size
@@ -187,7 +188,7 @@ def _eos_row(body: Body) -> tuple[float, ...]:
 
 
 def _failure_row(body: Body) -> tuple[float, ...]:
-    return failure_constants(body.failure, body.spacing)
+    return failure_constants(body.failure, CRACK_WIDTH * body.spacing)
 
 
 def _concrete_row(body: Body) -> tuple[float, ...]:

@@ -3,7 +3,7 @@
 Damage D in 0 ... 1 multiplies the stress of the intact material by 1 - D, pressure only in tension; a particle whose
 damage is 1 has failed. A material's `failure` is the tuple (D1, D2, D3, D4, D5, reference_rate, tensile_strength,
 fracture_energy, size): D1 = inf and tensile_strength = inf switch a criterion off, fracture_energy = 0 means failure at
-once. A crack within a particle of `size` [m] then takes fracture_energy [J/m2], whatever the size.
+once. A crack in particles that take up `size` [m] across it takes fracture_energy [J/m2], whatever the size.
 """
 
 from math import exp, log, sqrt
