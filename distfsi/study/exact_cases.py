@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -81,7 +80,6 @@ class Blast:
 
 BLASTS = {1: Blast(2 * 0.0673185, 0.5, 200, 50), 2: Blast(0.311357, 0.75, 120, 30), 3: Blast(0.851072, 1.0, 64, 12)}
 DEPOSIT = 2.5  # radius of the heated ball, in cells
-UNIT_BALL = {1: 2.0, 2: pi, 3: 4.0 / 3.0 * pi}
 
 
 def blast_line(dimensions: int, cells: int) -> str:
@@ -92,9 +90,10 @@ def blast_line(dimensions: int, cells: int) -> str:
     ends = ", ".join(f'{axis}=["symmetry", "outflow"]' for axis in "xyz"[:D])
     box = f"lower={[0.0] * D}, upper={[size] * D}, cells={[cells] * D}"
     settings = [f"domain={{{box}, {ends}}}"]
-    settings += [f"fluid.regions.1.pressure={0.4 * blast.energy / (UNIT_BALL[D] * hot**D)}"]
     settings += [f"fluid.regions.1.shape.center={[0.0] * D}", f"fluid.regions.1.shape.radius={hot}"]
-    simulation = finished("sedov.toml", settings)
+    held = start(load(INPUTS / "sedov.toml", [*settings, "fluid.regions.1.pressure=1"])).fluid.totals()[0][-1]
+    pressure = blast.energy / 2**D / held  # the cells that the ball covers in part do not add up to it exactly
+    simulation = finished("sedov.toml", [*settings, f"fluid.regions.1.pressure={pressure}"])
     r, p = radial_mean(simulation, "pressure")
     behind = 2.0 / 2.4 * (2.0 / (D + 2.0) * blast.radius) ** 2
     off = 100 * (half_way(r, p, 0.5 * behind) / blast.radius - 1.0)
