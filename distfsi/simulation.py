@@ -32,6 +32,7 @@ from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
 from distfsi.parts.accounts import Accounts
 from distfsi.parts.coupling import Coupling
+from distfsi.parts.cut_cells import CutCells
 from distfsi.parts.fluid import Fluid
 from distfsi.parts.gauges import Gauge, gauge_of
 from distfsi.parts.peaks import Peaks, schlieren
@@ -39,6 +40,7 @@ from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 
+COUPLINGS = {"cut_cells": CutCells, "paper": Coupling}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 STEPS_BETWEEN_DEALS = 100
 
@@ -65,16 +67,15 @@ def solid_step(solid: Solid, time_step: TimeStep) -> float:
 def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: TimeStep) -> float:
     """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
     solid.prepare(coupling.reach)
-    coupling.classify()
+    dt = time_step()
+    solid.advance(dt)  # Eqs. 5-7
+    coupling.follow()
     for stage in fluid.stages:
-        fluid.exchange_ghosts(stage)
-        coupling.fill(stage)  # Eqs. 31, 32
-        if stage is fluid.stages[0]:
-            dt = time_step()
+        coupling.before_stage(stage)
         fluid.advance_stage(stage, dt)
-        coupling.collect_force(stage, dt)  # Eqs. 33, 35
-    solid.advance(dt, coupling.impulse())  # Eqs. 5-7, 34
-    coupling.book_work()
+        coupling.after_stage(stage, dt)
+    gain = solid.kick(coupling.impulse())  # Eq. 34
+    coupling.book_work(gain)
     solid.migrate()
     return dt
 
@@ -121,7 +122,8 @@ class Simulation:
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
         solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
-        coupling = Coupling(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
+        coupled = COUPLINGS[scene.coupling.scheme]
+        coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling)
         if scene.output.peaks:
             simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
@@ -155,19 +157,20 @@ class Simulation:
         """The longest stable step [s] of all parts on all ranks. Raises Diverged when a part has no valid state."""
         signal = self.fluid.fastest_signal() if self.fluid else 0.0
         solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
-        rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, self.asked()])
-        fluid_rate, solid_rate, request = self.communicator.maximum(rates)
+        wall_dt = self.coupling.time_step() if self.coupling else np.inf
+        rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, 1.0 / wall_dt, self.asked()])
+        fluid_rate, solid_rate, wall_rate, request = self.communicator.maximum(rates)
         self.request = Request(int(request))
         if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
             raise Diverged("there is no stable time step")
-        if solid_rate > fluid_rate:
+        if solid_rate > max(fluid_rate, wall_rate):
             holder = [
                 reason for rate, reason in self.communicator.allgather((rates[1], solid_reason)) if rate == solid_rate
             ]
             self.limited_by = holder[0]
         else:
-            self.limited_by = "fluid CFL"
-        dt = 1.0 / max(fluid_rate, solid_rate)
+            self.limited_by = "fluid CFL" if fluid_rate >= wall_rate else "wall speed"
+        dt = 1.0 / max(fluid_rate, solid_rate, wall_rate)
         left = self.scene.time.end - self.time
         if dt >= left:
             self.limited_by = "end time"

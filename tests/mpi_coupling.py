@@ -7,14 +7,9 @@ import hashlib
 
 import numpy as np
 
-from distfsi.device.cpu import Team
-from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
-from distfsi.model import fluid_model
-from distfsi.parts.coupling import Coupling
-from distfsi.parts.fluid import SSP_RK3, Fluid
-from distfsi.parts.solid import Solid
 from distfsi.scene import description as d
+from distfsi.simulation import Simulation
 
 AIR = (d.Phase("air", d.IdealGas(1.4)),)
 AIR_AND_WATER = (*AIR, d.Phase("water", d.StiffenedGas(4.4, 60.0)))
@@ -42,7 +37,8 @@ class Coupled:
     """Fluid, solid and coupling of a scene, and the step that joins them."""
 
     def __init__(
-        self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64"
+        self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64",
+        scheme="paper", cfl=0.4, runge_kutta="rk3",
     ):  # fmt: skip
         D = len(lower)
         kinds = kinds or (("wall", "wall"),) * D
@@ -50,38 +46,23 @@ class Coupled:
         scene = d.Scene(
             title="test",
             domain=d.Domain(lower, upper, cells, kinds),
-            time=d.Time(1.0, 0.4, None),
+            time=d.Time(1e9, cfl, None, scheme=runge_kutta),
             gravity=(0.0,) * D,
             fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
             solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form="updated_lagrangian"),
             output=d.Output("", 0.0, 1),
             performance=d.Performance((block,) * D, (block,) * D),
+            coupling=d.Coupling(scheme),
         )
         self.communicator = Communicator()
-        self.blocks = Blocks(Grid.of(lower, upper, cells, kinds), scene.performance.block_cells, self.communicator)
-        team, model = Team(threads), fluid_model(scene)
-        self.fluid = Fluid(scene, model, self.blocks, team)
-        self.solid = Solid(scene, self.blocks, self.communicator, team)
-        self.coupling = Coupling(scene, model, self.fluid, self.solid, self.blocks, team)
+        self.simulation = Simulation.of(scene, self.communicator, threads)
+        self.blocks, self.fluid = self.simulation.blocks, self.simulation.fluid
+        self.solid, self.coupling = self.simulation.solid, self.simulation.coupling
 
     def step(self):
         """One stable step; returns its length and the impulse (D,) on all particles."""
-        fluid, solid, coupling = self.fluid, self.solid, self.coupling
-        solid.prepare(coupling.reach)
-        coupling.classify()
-        for stage in SSP_RK3:
-            fluid.exchange_ghosts(stage)
-            coupling.fill(stage)
-            if stage.number == 0:
-                rates = [fluid.fastest_signal() / 0.4, 1.0 / solid.time_step()[0]]
-                dt = 1.0 / self.communicator.maximum(np.array(rates)).max()
-            fluid.advance_stage(stage, dt)
-            coupling.collect_force(stage, dt)
-        impulse = coupling.impulse()
-        solid.advance(dt, impulse)
-        coupling.book_work()
-        solid.migrate()
-        return dt, self.communicator.concatenate(impulse).sum(axis=0)
+        self.simulation.step()
+        return self.simulation.dt, self.blocks.sum(self.solid.given.sum(axis=1))
 
     def balance(self):
         """Masses, momentum and energy that nothing may change."""
@@ -92,7 +73,7 @@ class Coupled:
             t["kinetic"] + t["internal"],
         ]
         created = sum(coupling.ledger().values())
-        return fluid.totals(coupling.covered)[0] + fluid.left_domain() + np.array(particles) - created
+        return fluid.totals(coupling.volume)[0] + fluid.left_domain() + np.array(particles) - created
 
     def grid_of(self, field):
         """(variables, z, y, x): the cells of all ranks of a field (local blocks, variables, Z, Y, X), on every rank."""

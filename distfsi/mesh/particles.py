@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -88,17 +88,27 @@ class ParticleExchange:
         order = np.lexsort((columns["id"], block))
         return {name: column[order] for name, column in columns.items()}
 
-    def ghosts(self, position: np.ndarray, id: np.ndarray, reach: float, bonded: np.ndarray | None = None) -> GhostPlan:
+    def ghosts(
+        self,
+        position: np.ndarray,
+        id: np.ndarray,
+        reach: float,
+        bonded: np.ndarray | None = None,
+        image_reach: float | None = None,
+        mirrors: Collection[str] = ("symmetry",),
+    ) -> GhostPlan:
         """Collective. Who needs copies of which particles, and the images at symmetry planes.
 
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
-        at the ends of the grid extend to infinity. Particles and ghosts within `reach` of symmetry planes have images.
+        at the ends of the grid extend to infinity. Particles and ghosts within `image_reach` [m], by default `reach`, of
+        the domain's ends of a kind among `mirrors` have images.
         `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`,
         on all ranks or none, holds the keys (see GhostPlan) of particles and images that this rank needs wherever they
         are. Raises InputError when a particle could have two images along one axis.
         """
         own = len(id)
-        planes = self.planes(reach)
+        image_reach = reach if image_reach is None else image_reach
+        planes = self.planes(image_reach, mirrors)
         pairs = self._near(position, reach)
         if bonded is not None and self.blocks.communicator.size > 1:
             pairs += self._bonded(id, np.unique(bonded // IMAGES))
@@ -109,7 +119,7 @@ class ParticleExchange:
         near = np.zeros(len(id), dtype=np.int64)
         plane = np.zeros_like(position)
         for axis, place in planes:
-            close = np.abs(position[:, axis] - place) <= reach
+            close = np.abs(position[:, axis] - place) <= image_reach
             near[close] |= 1 << axis
             plane[close, axis] = place
         if bonded is not None:
@@ -159,15 +169,15 @@ class ParticleExchange:
             pairs.append(rank[other] * len(position) + near[inside][other])
         return pairs
 
-    def planes(self, reach: float = 0.0) -> list[tuple[int, float]]:
-        """(axis, place [m]) of the symmetry planes; raises InputError when two are less than twice `reach` apart."""
+    def planes(self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",)) -> list[tuple[int, float]]:
+        """(axis, place [m]) of the planes that mirror; raises InputError when two are less than twice `reach` apart."""
         grid = self.blocks.grid
         planes = []
         for axis in range(grid.dimensions):
             ends = zip(grid.boundaries[axis], (grid.lower[axis], grid.upper[axis]), strict=True)
-            places = [place for kind, place in ends if kind == "symmetry"]
+            places = [place for kind, place in ends if kind in mirrors]
             if len(places) == 2 and places[1] - places[0] <= 2 * reach:
-                raise InputError([f"domain: symmetry planes {places} m are less than {2 * reach} m apart"])
+                raise InputError([f"domain: planes {places} m that mirror are less than {2 * reach} m apart"])
             planes += [(axis, place) for place in places]
         return planes
 

@@ -61,7 +61,7 @@ class Accounts:
 
         left = np.zeros(len(self.conserved))
         if self.fluid:
-            totals, magnitude = self.fluid.totals(self.coupling.covered if self.coupling else None)
+            totals, magnitude = self.fluid.totals(self.coupling.volume if self.coupling else None)
             book("fluid", totals, magnitude=magnitude)
             left = left + self.fluid.left_domain()
         if self.solid:

@@ -43,9 +43,6 @@ FLUID_DRIVERS = (
 class Coupling:
     """What the solid covers of the fluid's grid, the state of the covered cells, and the forces across the wall.
 
-    A step is solid.prepare(reach); classify(); for each stage fluid.exchange_ghosts(), fill(), fluid.advance_stage(),
-    collect_force(); then solid.advance(dt, impulse()); book_work().
-
     reach   [m]: how far the solid's ghosts and images must go
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid loses there),
             "covered" and "fresh" cells, "sides" (what the fluid counts as having left the domain at covered cells)
@@ -78,7 +75,7 @@ class Coupling:
         self._kick = blocks.allocate(grid.dimensions)
         self._ledger = {cause: np.zeros((blocks.local_count, model.conserved)) for cause in self.causes[:-1]}
         solid.prepare(self.reach)
-        self.classify()
+        self.follow()
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Primitive state (variables,) of the first region without its velocity."""
@@ -119,7 +116,11 @@ class Coupling:
 
     # ---- one step ---------------------------------------------------------------------------------------------------
 
-    def classify(self) -> None:
+    def time_step(self) -> float:
+        """Longest step [s] that the coupling allows: any."""
+        return np.inf
+
+    def follow(self) -> None:
         """Collective. Find the covered cells, and the velocity of the wall in those that fluxes see."""
         around, blocks, D = self.solid.around, self.blocks, self._dimensions
         position, mass = around["position"], around["mass"]
@@ -144,14 +145,14 @@ class Coupling:
             self._shape, self._spacing, blocks.origin,
         )  # fmt: skip
 
-    def fill(self, stage: Stage) -> None:
-        """Give the covered cells of the stage's input, and before the first stage the fresh ones, their states.
-
-        The input's ghost cells must be filled; those of covered cells need not be.
-        """
+    def before_stage(self, stage: Stage) -> None:
+        """Collective. Give the covered cells of the stage's input, and before the first stage the fresh ones, their
+        states (Eqs. 31, 32)."""
+        self.fluid.exchange_ghosts(stage)
         U, run, k = self.fluid.input_of(stage), self.team.run, self.fluid_kernels
         self.fluid.wake(self._occupied > 0)
         around = (self._kinds, self._shape, self._offsets, self._weights, self._rings, self._rest)
+        self._input = U
         run(k.fill_covered, len(self._covered), self._covered, self._velocity, U, *around)
         run(k.fill_deep, len(self._deep), self._deep, U, self._shape, self._rest)
         if stage.number == 0 and len(self._fresh):
@@ -160,10 +161,11 @@ class Coupling:
             content = U.reshape(*U.shape[:2], -1)[block, : self.model.conserved, cell]
             self._ledger["fresh"] += self._per_block(block, content * self._cell_volume)
 
-    def collect_force(self, stage: Stage, dt: float) -> None:
-        """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage."""
+    def after_stage(self, stage: Stage, dt: float) -> None:
+        """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage (Eqs. 33,
+        35)."""
         weights = stage.weight * dt * self._cell_volume / self._spacing
-        rest = (self.fluid.input_of(stage), self._kinds, self._shape, self._steps, weights)
+        rest = (self._input, self._kinds, self._shape, self._steps, weights)
         run, k = self.team.run, self.fluid_kernels
         run(k.collect_wall, len(self._covered), self._covered, self._passed, *rest)
         run(k.collect_sides, len(self._side), self._side_cells, self._side, self._through_sides, *rest)
@@ -175,10 +177,10 @@ class Coupling:
         wall = (self._covered, self._passed, self._velocity, self._inertia)
         run(self.fluid_kernels.spread, len(block), *wall, self._kick, self._shape)
         self._exchange(self._kick, np.arange(D), 0.0)
-        own = self.solid.columns
-        impulse, home = np.empty_like(own["position"]), np.empty(len(own["id"]), dtype=np.int64)
+        start, mass = self.solid.start, self.solid.columns["mass"]
+        impulse, home = np.empty_like(start), np.empty(len(mass), dtype=np.int64)
         run(
-            self.kernels.push, len(home), own["position"], own["mass"], impulse, home, self.reach, self._kick,
+            self.kernels.push, len(home), start, mass, impulse, home, self.reach, self._kick,
             self._shape, self._lower, self._spacing, blocks.origin, blocks.extent, self._seen_cells,
             np.array(grid.cells), np.array(blocks.block_cells), blocks.curve_index, blocks.first,
         )  # fmt: skip
@@ -187,8 +189,8 @@ class Coupling:
         self._ledger["wall"][:, P : P + D] += self._per_block(home, impulse)
         return impulse
 
-    def book_work(self) -> None:
-        """Enter the work of the impulse on the solid; after solid.advance()."""
+    def book_work(self, gain: np.ndarray) -> None:
+        """Enter the work of the impulse on the solid, after solid.kick() gave particles `gain` (own, D) [m/s]."""
         self._ledger["wall"][:, -1] += self.solid.work
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
@@ -226,6 +228,11 @@ class Coupling:
     def workload(self) -> np.ndarray:
         """(local blocks,) covered cells that fluxes see."""
         return np.bincount(self._in_block(self._covered)[0], minlength=self.blocks.local_count).astype(float)
+
+    @property
+    def volume(self) -> np.ndarray:
+        """(local blocks, Z, Y, X) the part of each cell that fluid fills: all or nothing."""
+        return np.where(self.covered, 0.0, 1.0)
 
     def snapshot(self) -> Snapshot:
         """What a restart needs: which cells are covered, so that those are known that come free; and the books."""

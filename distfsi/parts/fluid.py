@@ -118,6 +118,10 @@ class Fluid:
         """The state that a stage starts from, on the device."""
         return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].there
 
+    def output_of(self, stage: Stage) -> np.ndarray:
+        """Where a stage leaves its state; asked before the stage."""
+        return self._buffers[_output(stage.number)]
+
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
         self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
@@ -209,16 +213,17 @@ class Fluid:
         rested, everything = self.blocks.communicator.concatenate(self.rest.counts[None]).sum(axis=0)
         return rested / max(everything, 1)
 
-    def totals(self, covered: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def totals(self, volume: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Masses, momentum and energy (conserved,) of all ranks' cells, and the sums of their absolute values.
 
-        Cells that are `covered` (local blocks, Z, Y, X) are left out.
+        volume (local blocks, Z, Y, X): the part of each cell that fluid fills, by default all.
         """
         sums = np.zeros((self.blocks.local_count, 2, self.model.conserved))
         for block in range(self.blocks.local_count):
             cells = self.cells(block)[: self.model.conserved].astype(np.float64)
-            if covered is not None:
-                cells = np.where(self.active(covered, block), 0.0, cells)
+            if volume is not None:
+                part = self.active(volume, block).astype(np.float64)
+                cells = np.where(part > 0.0, part * cells, 0.0)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
         sums *= self._cell_volume()
         totals = self.blocks.sum(sums.reshape(len(sums), 2 * self.model.conserved))

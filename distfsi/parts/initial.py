@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from distfsi.mesh.blocks import Blocks
 from distfsi.scene.description import Fluid, FluidState
-from distfsi.scene.shapes import cell_fractions
+from distfsi.scene.shapes import cell_fractions, contains
 
 
 class InitialState:
@@ -43,6 +43,14 @@ class InitialState:
                     continue
                 part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
                 cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, part * new + (1.0 - part) * cells))
+
+    def at(self, positions: np.ndarray) -> np.ndarray:
+        """States (variables, n) at points (n, D) [m]."""
+        states = np.empty((self.model.variables, len(positions)))
+        for region in self.fluid.regions:
+            inside = np.s_[:] if region.shape is None else contains(region.shape, positions)
+            states[:, inside] = self.of(region.state)[:, None]
+        return states
 
     def _fraction(self, state: FluidState) -> float:
         trace = self.fluid.minimum_volume_fraction

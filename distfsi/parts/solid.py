@@ -144,26 +144,23 @@ class Solid:
         dt = float(self._limits[particle, cause])
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {self.columns['id'][particle]}"
 
-    def advance(self, dt: float, impulse: np.ndarray | None = None) -> None:
-        """Collective, after prepare(). Advance by `dt` [s], while the fluid gives `impulse` (own, D) [N s].
+    def advance(self, dt: float) -> None:
+        """Collective, after prepare(). Advance by `dt` [s]: velocities first, then positions.
 
-        The energy takes the mean of old and new velocities: kinetic plus internal energy grow by the external work.
+        The energy takes the mean of old and new velocities: kinetic plus internal energy grow by the work of gravity.
         """
-        self.kick(dt, impulse)
+        self.kick(dt)
         self.drift(dt)
 
-    def kick(self, dt: float, impulse: np.ndarray | None = None) -> None:
-        """After prepare(). Give the particles the velocities after `dt` [s] of the forces and after the `impulse`."""
+    def kick(self, dt: float) -> None:
+        """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
         c = self.columns
         mass, fixed = c["mass"][:, None], c["fixed"][:, None]
-        impulse = np.zeros_like(c["velocity"]) if impulse is None else impulse
         weight = mass * self.gravity * dt
         received = mass * self._acceleration * dt
-        velocity = np.where(fixed, c["velocity"], c["velocity"] + (received + weight + impulse) / mass)
+        velocity = np.where(fixed, c["velocity"], c["velocity"] + (received + weight) / mass)
         mean = 0.5 * (c["velocity"] + velocity)
-        self.work = self._per_block((impulse * mean).sum(axis=1, keepdims=True))[:, 0]
-        self.given = self._per_block_and_body(impulse)
-        held = -(fixed * (received + weight + impulse))  # impulse of what moves the fixed particles
+        held = -(fixed * (received + weight))  # impulse of what moves the fixed particles
         self._gravity_work += self._per_block((weight * mean + held * velocity).sum(axis=1, keepdims=True))[:, 0]
         self._boundary_impulse += self._per_block(received + weight + held)
         c["velocity"] = velocity
@@ -176,6 +173,22 @@ class Solid:
         self.form.strain(c, self._near, dt, around, gradient)
         self._deform(dt, gradient)
         c["position"] = c["position"] + dt * c["velocity"]
+
+    def push(self, impulse: np.ndarray) -> np.ndarray:
+        """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s].
+
+        Returns the gain (own, D) of velocity [m/s]; there is none where particles are fixed.
+        """
+        c = self.columns
+        fixed = c["fixed"][:, None]
+        gain = np.where(fixed, 0.0, impulse / c["mass"][:, None])
+        self.work = self._per_block((impulse * (c["velocity"] + 0.5 * gain)).sum(axis=1, keepdims=True))[:, 0]
+        self.given = self._per_block_and_body(impulse)
+        held = -(fixed * impulse)
+        self._gravity_work += self._per_block((held * c["velocity"]).sum(axis=1, keepdims=True))[:, 0]
+        self._boundary_impulse += self._per_block(held)
+        c["velocity"] = c["velocity"] + gain
+        return gain
 
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
@@ -206,6 +219,11 @@ class Solid:
         group, count = self._block * bodies + self.columns["body"], self.blocks.local_count * bodies
         sums = np.stack([np.bincount(group, v, minlength=count) for v in values.T], axis=1)
         return sums.reshape(-1, bodies, values.shape[1])
+
+    @property
+    def start(self) -> np.ndarray:
+        """Positions (own, D) [m] as of prepare()."""
+        return self._near.position[: self._near.own]
 
     @property
     def around(self) -> dict[str, np.ndarray]:

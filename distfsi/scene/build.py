@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from distfsi.scene import description, schema
 from distfsi.scene.description import (
     Body,
+    Coupling,
     Domain,
     Fluid,
     FluidState,
@@ -20,6 +21,7 @@ from distfsi.scene.description import (
     Time,
 )
 from distfsi.scene.schema import (
+    CouplingInput,
     DomainInput,
     FluidInput,
     GaugeInput,
@@ -139,6 +141,11 @@ def _gauge(name: str, given: GaugeInput, end: float, bodies: Sequence[str]) -> G
             return description.ParticleGauge(name, bodies.index(body), position, every or EACH_STEP)
         case schema.BodyGauge(body=body, every=every):
             return description.BodyGauge(name, bodies.index(body), every or EACH_STEP)
+
+
+def build_coupling(given: CouplingInput) -> Coupling:
+    """The scheme between fluid and solid."""
+    return Coupling(given.scheme)
 
 
 def build_performance(given: PerformanceInput, dimensions: int) -> Performance:

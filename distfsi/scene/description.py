@@ -14,6 +14,7 @@ RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
+CouplingScheme = Literal["cut_cells", "paper"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
 
@@ -444,6 +445,13 @@ Gauge = PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """How fluid and solid meet."""
+
+    scheme: CouplingScheme = "cut_cells"
+
+
+@dataclass(frozen=True)
 class Performance:
     """Block and tile sizes in cells per axis; they change speed only, never a bit of the result."""
 
@@ -465,3 +473,4 @@ class Scene:
     output: Output
     performance: Performance
     gauges: tuple[Gauge, ...] = ()
+    coupling: Coupling = Coupling()

@@ -85,6 +85,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         solid=solid,
         output=build.build_output(sections.output, stem, fluid),
         performance=build.build_performance(sections.performance, dimensions),
+        coupling=build.build_coupling(sections.coupling),
         gauges=build.build_gauges(sections.gauges, sections.time.end, list(sections.solid.bodies if solid else ())),
     )
     return scene, faults

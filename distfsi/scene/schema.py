@@ -257,6 +257,15 @@ class BodyGauge(Table):
 GaugeInput = Annotated[PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge, Field(discriminator="kind")]
 
 
+class CouplingInput(Table):
+    """How fluid and solid meet."""
+
+    scheme: description.CouplingScheme = Field(
+        "cut_cells",
+        description='"cut_cells": conservative, tight and quiet; "paper": covered cells take their state from the fluid',
+    )
+
+
 class PerformanceInput(Table):
     """Sizes that change speed, never the result."""
 
@@ -279,6 +288,7 @@ class Sections(Table):
     solid: SolidInput | None = None
     output: OutputInput = OutputInput()
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
+    coupling: CouplingInput = CouplingInput()
     performance: PerformanceInput = PerformanceInput()
 
 

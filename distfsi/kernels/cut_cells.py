@@ -1,0 +1,333 @@
+"""Loops over the band of cells around the wall: contents and their mixing, fluxes through open faces and the wall's.
+
+Between a stage and the mixing after it the band's cells hold contents v U, otherwise states U; a cell outside the band
+is whole, so that both are the same. `swept` (blocks, SWEPT, Z, Y, X) holds v and, for two phases, the contents of both
+phase energies. Cells are named as in kernels/coupling.py.
+"""
+
+from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.kernels.coupling import BOX, COVERED, FLUID, LINE, add_flux
+from distfsi.kernels.cut_geometry import is_in_domain, opening
+from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
+from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
+from distfsi.physics.tensors import dot
+
+SWEPT = 3  # fields of `swept` for two phases; one phase has 1
+SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
+GIVEN = 0.125  # of its volume: the most that a cell gives to a neighbour at a time
+
+# ---- contents -------------------------------------------------------------------------------------------------------
+
+
+@helper
+def state_at(U, at, cells):
+    """What a cell holds."""
+    first = at + at // cells * (VARIABLES - 1) * cells
+    return tuple(load(U, first + v * cells) for v in static_range(VARIABLES))
+
+
+@helper
+def share_at(at, cells):
+    """Flat index of a cell's volume in `swept`."""
+    return at + at // cells * ((SWEPT - 1) * cells if PHASES == 2 else 0)
+
+
+@helper
+def put_content(U, swept, at, cells, content):
+    """Store a content, and the phase energies that belong to it."""
+    first = at + at // cells * (VARIABLES - 1) * cells
+    for v in static_range(VARIABLES):
+        store(U, first + v * cells, content[v])
+    if PHASES == 2:
+        share = share_at(at, cells)
+        store(swept, share + cells, content[VARIABLES])
+        store(swept, share + 2 * cells, content[VARIABLES + 1])
+
+
+@driver
+def take_contents(begin, end, band, U, swept, shape):
+    """States of the band become contents."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        at = band[n]
+        put_content(U, swept, at, cells, with_energies(state_at(U, at, cells), load(swept, share_at(at, cells))))
+
+
+@helper
+def index_of(at, shape, origin):
+    """Place of a cell in the grid."""
+    b = at // (shape[0] * shape[1] * shape[2])
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    return (
+        origin[b, 0] + at % shape[2] - 2,
+        origin[b, 1] + at // shape[2] % shape[1] - gy,
+        origin[b, 2] + at // (shape[1] * shape[2]) % shape[0] - gz,
+    )
+
+
+@helper
+def way_to_master(master, at, cells, steps):
+    """Step in memory from a cell to its master; 0 if it has none."""
+    first, way = at + at // cells * (DIMENSIONS - 1) * cells, 0
+    for d in static_range(DIMENSIONS):
+        way += master[first + d * cells] * steps[d]
+    return way
+
+
+@helper
+def add_content(total, U, swept, fraction, at, cells):
+    """Add a cell's content, phase energies, volume and open fraction to the four parts of `total`."""
+    Q, share = state_at(U, at, cells), share_at(at, cells)
+    for v in static_range(VARIABLES):
+        total[v] += Q[v]
+    if PHASES == 2:
+        total[VARIABLES] += load(swept, share + cells)
+        total[VARIABLES + 1] += load(swept, share + 2 * cells)
+    total[VARIABLES + 2] += load(swept, share)
+    total[VARIABLES + 3] += load(fraction, at)
+
+
+@driver
+def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, shape, origin, grid_cells):
+    """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs."""
+    cells = shape[0] * shape[1] * shape[2]
+    total = workspace(VARIABLES + 4)
+    for n in range(begin, end):
+        at = band[n]
+        center = at + way_to_master(master, at, cells, steps)
+        for v in range(VARIABLES + 4):
+            total[v] = 0.0
+        add_content(total, U, swept, fraction, center, cells)
+        joined = center != at
+        index = index_of(center, shape, origin)
+        for m in range(len(offsets)):
+            if is_in_domain(index, offsets[m], grid_cells):
+                step = 0
+                for d in static_range(DIMENSIONS):
+                    step += offsets[m, d] * steps[d]
+                way = way_to_master(master, center + step, cells, steps)
+                if way != 0 and way == -step:
+                    joined = True
+                    add_content(total, U, swept, fraction, center + step, cells)
+        volume = max(total[VARIABLES + 2], SEALED)
+        Q = tuple(total[v] for v in static_range(VARIABLES + 2))
+        state = state_of(Q, volume)
+        for v in static_range(VARIABLES):
+            mixed[n, v] = state[v]
+        mixed[n, VARIABLES] = volume * (load(fraction, at) / total[VARIABLES + 3] if joined else 1.0)
+
+
+@driver
+def put_mixed(begin, end, band, mixed, U, swept, shape):
+    """Store the states and volumes of the band."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        first = band[n] + band[n] // cells * (VARIABLES - 1) * cells
+        for v in static_range(VARIABLES):
+            store(U, first + v * cells, mixed[n, v])
+        store(swept, share_at(band[n], cells), mixed[n, VARIABLES])
+
+
+@driver
+def put_rest(begin, end, covered, U, swept, rest, shape):
+    """Covered cells hold the state `rest` in no volume."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        first = covered[n] + covered[n] // cells * (VARIABLES - 1) * cells
+        for v in static_range(VARIABLES):
+            store(U, first + v * cells, rest[v])
+        store(swept, share_at(covered[n], cells), 0.0)
+
+
+# ---- fluxes ---------------------------------------------------------------------------------------------------------
+
+
+@helper
+def open_between(kind, old, new, at, axis, step, cells):
+    """Open part of the face between a cell and the one a `step` below along the axis; no fluid enters covered cells."""
+    both = kind[at] != COVERED and kind[at - step] != COVERED
+    return opening(old, new, at, axis, cells) if both else 0.0
+
+
+@helper
+def flux_beside_wall(U, kind, old, new, at, cells, steps, axis, P, T, F):
+    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage.
+
+    P holds five lines of four cells: the one through the face, and those beside it if the flux looks there. The slope
+    of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
+    """
+    first, step = at + at // cells * (VARIABLES - 1) * cells, steps[axis]
+    for c in range(4):
+        primitives_row(U, P, first + (c - 1) * step, cells, LINE + c, BOX, 1)
+    if LOOKS_SIDEWAYS:
+        for d in range(1, DIMENSIONS):
+            beside = steps[(axis + d) % DIMENSIONS]
+            for c in range(1, 3):
+                primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
+                primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
+    slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
+    between = open_between(kind, old, new, at + step, axis, step, cells)
+    for c in range(2):
+        beyond = open_between(kind, old, new, at + 2 * c * step, axis, step, cells)
+        if not (between > 0.0 and beyond > 0.0):
+            for v in range(VARIABLES):
+                T[2 * v + c] = 0.0
+    flux_row(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, 1)
+    return between
+
+
+@driver
+def find_walls(begin, end, band, area, kind, old, new, shape, steps, spacing):
+    """area (n, D) [1/m] = the wall's area per volume of the cell, along its normal into the solid; it closes what the
+    open faces leave open."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        for axis in range(DIMENSIONS):
+            step = steps[axis]
+            low = open_between(kind, old, new, band[n], axis, step, cells)
+            high = open_between(kind, old, new, band[n] + step, axis, step, cells)
+            area[n, axis] = (low - high) / spacing[axis]
+
+
+@driver
+def advance_band(
+    begin, end, band, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new, shape, steps,
+    rates, b, dt, weight,
+):  # fmt: skip
+    """One stage of the band's cells: U_new and swept = their contents.
+
+    start_volume (n,): of the fluid before the step. area, velocity (n, D): of the wall; impulse (n, D) [N s/m3] and
+    work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
+    """
+    cells = shape[0] * shape[1] * shape[2]
+    P, T, F, D = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES), workspace(FLUXES)
+    for n in range(begin, end):
+        at = band[n]
+        for v in range(FLUXES):
+            D[v] = 0.0
+        for axis in range(DIMENSIONS):
+            step = steps[axis]
+            for side in range(2):
+                here = at + (side - 1) * step
+                if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
+                    between = flux_beside_wall(U, kind, old, new, here, cells, steps, axis, P, T, F)
+                    rate = (2 * side - 1) * rates[axis] * between
+                    for v in range(FLUXES):
+                        D[v] += rate * load(F, 2 * place(v, axis))
+        now = state_at(U, at, cells)
+        surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
+        wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
+        size, normal = normal_of(surface)
+        freed = dt * dot(surface, wall)
+        if size > 0.0:
+            W = primitives(now)
+            relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
+            p = wall_pressure(now, W, dot(relative, normal))
+            for d in static_range(DIMENSIONS):
+                D[PHASES + d] += dt * p * surface[d]
+                impulse[n, d] += weight * p * surface[d]
+            D[PHASES + DIMENSIONS] += freed * p
+            work[n] += weight * p * dot(surface, wall)
+        share = share_at(at, cells)
+        volume, start = load(swept, share), start_volume[n]
+        divergence = tuple(D[v] for v in static_range(FLUXES))
+        content = stage_content(state_at(U_n, at, cells), now, start, volume, divergence, freed, b, dt)
+        put_content(U_new, swept, at, cells, content)
+        store(swept, share, start + b * (volume + freed - start))
+
+
+@driver
+def book_sides(
+    begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, weights
+):  # fmt: skip
+    """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
+    1 high), beyond what leaves there, for the cells `chosen`. weights (D,): share of the stage * dt * area of a face."""
+    cells = shape[0] * shape[1] * shape[2]
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    for m in range(begin, end):
+        n = chosen[m]
+        axis, high = side[n] // 2, side[n] % 2
+        step = steps[axis]
+        before = side_cells[n] if high == 1 else side_cells[n] - step
+        weight = (2 * high - 1) * weights[axis]
+        add_flux(passed, n, U, before, cells, steps, axis, weight, P, T, F)
+        if open_between(kind, old, new, before + step, axis, step, cells) > 0.0:
+            between = flux_beside_wall(U, kind, old, new, before, cells, steps, axis, P, T, F)
+            for v in range(PHASES + DIMENSIONS + 1):
+                passed[n, v] -= weight * between * load(F, 2 * place(v, axis))
+
+
+# ---- volumes --------------------------------------------------------------------------------------------------------
+
+
+@helper
+def surplus(kind, swept, fraction, at, cells):
+    """Swept less geometric volume of a cell; 0 where nothing may be exchanged."""
+    part = load(fraction, at)
+    return load(swept, share_at(at, cells)) - part if kind[at] == FLUID and part > 0.0 else 0.0
+
+
+@helper
+def opposite(kind, swept, fraction, old, new, at, sign, cells, steps, index, grid_cells):
+    """Sum of what the neighbours behind open faces have too little, if `sign` is positive, or too much."""
+    total = 0.0
+    for axis in range(DIMENSIONS):
+        for side in range(2):
+            place_there = index[axis] + 2 * side - 1
+            if place_there >= 0 and place_there < grid_cells[axis]:
+                face = at + side * steps[axis]
+                if opening(old, new, face, axis, cells) > 0.0:
+                    other = surplus(kind, swept, fraction, at + (2 * side - 1) * steps[axis], cells)
+                    total += max(-sign * other, 0.0)
+    return total
+
+
+@driver
+def exchange_volumes(
+    begin, end, band, mixed, U, swept, kind, fraction, old, new, steps, shape, origin, grid_cells
+):  # fmt: skip
+    """mixed (n, VARIABLES + 1) = state and volume of the band's cells after those with too much have given to their
+    neighbours with too little, with the content that belongs to it."""
+    cells = shape[0] * shape[1] * shape[2]
+    total = workspace(VARIABLES)
+    for n in range(begin, end):
+        at = band[n]
+        volume = load(swept, share_at(at, cells))
+        state = state_at(U, at, cells)
+        for v in static_range(VARIABLES):
+            total[v] = volume * state[v]
+        gained = 0.0
+        mine = surplus(kind, swept, fraction, at, cells)
+        if mine != 0.0:
+            sign = 1.0 if mine > 0.0 else -1.0
+            index = index_of(at, shape, origin)
+            around = opposite(kind, swept, fraction, old, new, at, sign, cells, steps, index, grid_cells)
+            for axis in range(DIMENSIONS):
+                for side in range(2):
+                    way = 2 * side - 1
+                    other_index = (
+                        index[0] + (way if axis == 0 else 0),
+                        index[1] + (way if axis == 1 else 0),
+                        index[2] + (way if axis == 2 else 0),
+                    )
+                    there = at + way * steps[axis]
+                    inside = other_index[axis] >= 0 and other_index[axis] < grid_cells[axis]
+                    if inside and opening(old, new, at + side * steps[axis], axis, cells) > 0.0:
+                        theirs = surplus(kind, swept, fraction, there, cells)
+                        if mine * theirs < 0.0:
+                            far = opposite(
+                                kind, swept, fraction, old, new, there, -sign, cells, steps, other_index, grid_cells
+                            )
+                            giver = at if mine > 0.0 else there
+                            held = load(swept, share_at(giver, cells))
+                            moved = min(-mine * theirs / max(around, far), GIVEN * held)
+                            given = state_at(U, giver, cells)
+                            gained -= sign * moved
+                            for v in static_range(VARIABLES):
+                                total[v] -= sign * moved * given[v]
+        for v in static_range(VARIABLES):
+            mixed[n, v] = total[v] / (volume + gained) if gained != 0.0 else state[v]
+        mixed[n, VARIABLES] = volume + gained

@@ -1,0 +1,86 @@
+"""Loops of the cut cells' forces: the velocity of the wall, and the work that the solid's gain of velocity costs.
+
+Cells give to particles with the weights by which they see them (kernels/coupling.py: push), mass times kernel; so
+momentum and work arrive as they leave.
+"""
+
+from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.kernels.coupling import center_of
+from distfsi.kernels.cut_cells import index_of, share_at, way_to_master
+from distfsi.kernels.cut_geometry import is_in_domain
+from distfsi.kernels.gather import sum_particles
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
+from distfsi.physics.tensors import dot
+
+
+@helper
+def has_wall(area, n):
+    """Whether the wall passes through a cell of the band."""
+    surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
+    return dot(surface, surface) > 0.0
+
+
+@driver
+def see_particles(
+    begin, end, band, area, mean, inertia, radius, momentum, position, start, order, lower, size, low, window, strides,
+    shape, spacing, origin,
+):  # fmt: skip
+    """mean (n, D) [m/s] of the particles' velocities, by mass times kernel, in the band's cells with a wall.
+
+    momentum (particles, 1 + D): mass and mass times velocity; inertia (n,) = sum of mass times kernel.
+    """
+    sums = workspace(1 + DIMENSIONS)
+    for n in range(begin, end):
+        inertia[n] = 0.0
+        for d in static_range(DIMENSIONS):
+            mean[n, d] = 0.0
+        if has_wall(area, n):
+            x = center_of(band[n], shape, lower, spacing, origin)
+            sum_particles(sums, x, radius, momentum, position, start, order, lower, size, low, window, strides)
+            inertia[n] = sums[0]
+            if sums[0] > 0.0:
+                for d in static_range(DIMENSIONS):
+                    mean[n, d] = sums[1 + d] / sums[0]
+
+
+@driver
+def spread_impulse(begin, end, band, impulse, inertia, kick, shape):
+    """kick (blocks, D, Z, Y, X) = velocity that a particle gains from a cell per kernel value [m^(d+1)/s]."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        at = band[n] + band[n] // cells * (DIMENSIONS - 1) * cells
+        for d in static_range(DIMENSIONS):
+            store(kick, at + d * cells, impulse[n, d] / inertia[n] if inertia[n] > 0.0 else 0.0)
+
+
+@driver
+def find_debts(begin, end, band, debt, impulse, gain):
+    """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity
+    before: half of it times the `gain` (n, D) [m/s] of the particles that it sees."""
+    for n in range(begin, end):
+        J, dv = tuple(impulse[n, d] for d in static_range(DIMENSIONS)), tuple(gain[n, d] for d in static_range(DIMENSIONS))
+        store(debt, band[n], 0.5 * dot(J, dv))
+
+
+@driver
+def pay_debts(begin, end, band, paid, debt, U, swept, master, offsets, steps, shape, origin, grid_cells):
+    """Masters pay out of their energy for themselves and for those that joined them; paid (n,) [J/m3] of the cell."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        at = band[n]
+        paid[n] = 0.0
+        if way_to_master(master, at, cells, steps) == 0:
+            owed = load(debt, at)
+            index = index_of(at, shape, origin)
+            for m in range(len(offsets)):
+                if is_in_domain(index, offsets[m], grid_cells):
+                    step = 0
+                    for d in static_range(DIMENSIONS):
+                        step += offsets[m, d] * steps[d]
+                    way = way_to_master(master, at + step, cells, steps)
+                    if way != 0 and way == -step:
+                        owed += load(debt, at + step)
+            energy = at + (at // cells * (VARIABLES - 1) + PHASES + DIMENSIONS) * cells
+            paid[n] = owed
+            store(U, energy, load(U, energy) - owed / load(swept, share_at(at, cells)))

@@ -1,0 +1,364 @@
+"""Loops of the cut cells' geometry: signed distances at the corners of cells, what they leave open of faces and cells,
+which cells join which, and the lists of cells that are not whole.
+
+Particles are smoothed with a kernel; inverting its plane profile turns the sum at a corner into a distance that is
+linear in the positions of the particles. Where a body is thinner than the diagonal of a cell its particles count as
+balls, so that no cell sees both of its sides.
+
+Cells are named as in kernels/coupling.py. Cells around a block are looked at in its ghosts; corners outside the domain
+are seen in the mirror of its sides.
+"""
+
+from math import floor, sqrt
+
+from distfsi.device.markers import driver, helper, load, workspace
+from distfsi.kernels.coupling import COVERED, FLUID, cell_at
+from distfsi.kernels.gather import any_particle, bins_around, sum_particles
+from distfsi.physics.apertures import open_cell, open_face
+from distfsi.physics.immersed import immersed_weight
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS
+from distfsi.physics.tensors import dot
+
+FILLED = 0.97  # of the kernel: a body is thick where a particle is as deep as this
+FADING = 0.1  # of the kernel: over which the balls vanish as a body becomes thick
+NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
+
+# What a block is: far from all particles and whole; near particles or else; with cells that are not whole.
+NEAR, CUT = 1, 2
+
+# ---- distances ------------------------------------------------------------------------------------------------------
+
+
+@driver
+def fill_kernel(begin, end, filled, radius, volume, position, start, order, lower, size, low, window, strides):
+    """filled[p] = share of the kernel around a particle that is filled with particles' `volume` (n, 1)."""
+    sums = workspace(1)
+    for p in range(begin, end):
+        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
+        sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
+        filled[p] = sums[0]
+
+
+@driver
+def thicken(
+    begin, end, ball, filled, radius, ball_radius, volume, position, start, order, lower, size, low, window, strides
+):  # fmt: skip
+    """ball[p] = radius [m] of a particle's ball: `ball_radius` in a body so thin that no kernel nearby is filled."""
+    for p in range(begin, end):
+        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
+        bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
+        most = filled[p]
+        for k in range(bz[0], bz[1]):
+            for j in range(by[0], by[1]):
+                row = k * strides[2] + j * strides[1]
+                for n in range(start[row + bx[0]], start[row + bx[1]]):
+                    q = order[n]
+                    dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
+                    if dot(dx, dx) < radius * radius:
+                        most = max(most, filled[q])
+        ball[p] = ball_radius * min(max((FILLED - most) / FADING, 0.0), 1.0) if volume[p, 0] > 0.0 else 0.0
+
+
+@helper
+def distance_of(filled, profile, radius):
+    """Distance [m] of a plane wall that fills this share of the kernel; profile: shares on one side of planes."""
+    free = 1.0 - filled
+    first, last = 0, len(profile) - 1
+    while last - first > 1:
+        middle = (first + last) // 2
+        if profile[middle] <= free:
+            first = middle
+        else:
+            last = middle
+    part = min(max((free - profile[first]) / (profile[last] - profile[first]), 0.0), 1.0)
+    return radius * (2.0 * (first + part) / (len(profile) - 1) - 1.0)
+
+
+@helper
+def distance_at(
+    x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window, strides
+):  # fmt: skip
+    """Signed distance [m] of a point to the wall; |distance| <= radius."""
+    filled, nearest = 0.0, radius
+    bx, by, bz = bins_around(x, tuple(search for _ in static_range(DIMENSIONS)), lower, size, low, window)
+    for k in range(bz[0], bz[1]):
+        for j in range(by[0], by[1]):
+            row = k * strides[2] + j * strides[1]
+            for n in range(start[row + bx[0]], start[row + bx[1]]):
+                p = order[n]
+                dx = tuple(x[d] - position[p, d] for d in static_range(DIMENSIONS))
+                distance2 = dot(dx, dx)
+                if distance2 < radius * radius:
+                    filled += volume[p, 0] * immersed_weight(distance2, radius)
+                if ball[p] > 0.0 and distance2 < search * search:
+                    nearest = min(nearest, sqrt(distance2) - ball[p])
+    return min(distance_of(filled, profile, radius), nearest)
+
+
+@helper
+def corner_at(block, i, j, k, shape):
+    """Flat index of the low corner of a cell in a field of corners."""
+    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
+    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
+    return ((block * (shape[0] + uz) + k + gz) * (shape[1] + uy) + j + gy) * (shape[2] + 1) + i + 2
+
+
+@helper
+def mirrored(index, cells):
+    """The plane between cells of which `index` is the image in the sides of the domain."""
+    if index < 0:
+        return -index
+    if index > cells:
+        return 2 * cells - index
+    return index
+
+
+@driver
+def find_distances(
+    begin, end, near, distance, radius, search, volume, ball, profile, position, start, order, lower, size, low, window,
+    strides, shape, spacing, origin, extent, cells,
+):  # fmt: skip
+    """distance = that of the corners of all cells of blocks that have particles nearby; near (blocks,) = which these
+    are, after it said which had cells that were not whole."""
+    for b in range(begin, end):
+        middle = tuple(lower[d] + (origin[b, d] + 0.5 * extent[b, d]) * spacing[d] for d in static_range(DIMENSIONS))
+        reach = tuple((0.5 * extent[b, d] + 2.0) * spacing[d] + search for d in static_range(DIMENSIONS))
+        if near[b] == 0 and not any_particle(middle, reach, start, lower, size, low, window, strides):
+            continue
+        near[b] = NEAR
+        y_first, y_end = (-2, extent[b, 1] + 3) if DIMENSIONS > 1 else (0, 1)
+        z_first, z_end = (-2, extent[b, 2] + 3) if DIMENSIONS > 2 else (0, 1)
+        for k in range(z_first, z_end):
+            for j in range(y_first, y_end):
+                for i in range(-2, extent[b, 0] + 3):
+                    place = (
+                        mirrored(origin[b, 0] + i, cells[0]),
+                        mirrored(origin[b, 1] + j, cells[1]),
+                        mirrored(origin[b, 2] + k, cells[2]),
+                    )
+                    x = tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
+                    value = distance_at(
+                        x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window,
+                        strides,
+                    )  # fmt: skip
+                    least = 1e-7 * spacing[0]
+                    distance[corner_at(b, i, j, k, shape)] = least if abs(value) < least else value
+
+
+@driver
+def open_up(begin, end, near, distance, before, fraction, aperture, shape, extent):
+    """fraction of each cell, and aperture (blocks, D, Z, Y, X) of its low faces, that is open; in `near` blocks.
+
+    near becomes CUT where a cell is not open as a whole, now or `before`.
+    """
+    cells = shape[0] * shape[1] * shape[2]
+    uy, uz = (1 if DIMENSIONS > 1 else 0), (1 if DIMENSIONS > 2 else 0)
+    sy, sz = shape[2] + 1, (shape[2] + 1) * (shape[1] + uy)
+    for b in range(begin, end):
+        if near[b] == 0:
+            continue
+        y_first, y_end = (-2, extent[b, 1] + 2) if DIMENSIONS > 1 else (0, 1)
+        z_first, z_end = (-2, extent[b, 2] + 2) if DIMENSIONS > 2 else (0, 1)
+        for k in range(z_first, z_end):
+            for j in range(y_first, y_end):
+                for i in range(-2, extent[b, 0] + 2):
+                    at, c = cell_at(b, i, j, k, shape), corner_at(b, i, j, k, shape)
+                    d = (
+                        distance[c],
+                        distance[c + 1],
+                        distance[c + uy * sy],
+                        distance[c + uy * sy + 1],
+                        distance[c + uz * sz],
+                        distance[c + uz * sz + 1],
+                        distance[c + uz * sz + uy * sy],
+                        distance[c + uz * sz + uy * sy + 1],
+                    )
+                    part = open_cell(d)
+                    fraction[at] = part if part > 1e-9 else 0.0
+                    if min(part, before[at]) < 1.0:
+                        near[b] = CUT
+                    face = at + b * (DIMENSIONS - 1) * cells
+                    aperture[face] = open_face((d[0], d[2], d[4], d[6]))
+                    if DIMENSIONS > 1:
+                        aperture[face + cells] = open_face((d[0], d[1], d[4], d[5]))
+                    if DIMENSIONS > 2:
+                        aperture[face + 2 * cells] = open_face((d[0], d[1], d[2], d[3]))
+
+
+# ---- who joins whom -------------------------------------------------------------------------------------------------
+
+
+@helper
+def opening(old, new, at, axis, cells):
+    """Mean over the step of the open part of the low face of a cell along `axis`."""
+    face = at + at // cells * (DIMENSIONS - 1) * cells + axis * cells
+    return 0.5 * (load(old, face) + load(new, face))
+
+
+@helper
+def path_is_open(old, new, at, offset, sequence, steps, cells):
+    """Whether one gets from a cell to the one at `offset`, along the axes in `sequence`, through open faces only."""
+    here, least = at, 1.0
+    for m in range(DIMENSIONS):
+        axis = sequence[m]
+        if offset[axis] != 0:
+            face = here + steps[axis] if offset[axis] > 0 else here
+            least = min(least, opening(old, new, face, axis, cells))
+            here += offset[axis] * steps[axis]
+    return least > 0.0
+
+
+@helper
+def is_needy(fraction_old, fraction_new, swept, at, share):
+    """Whether the fluid in a cell has to join a neighbour's."""
+    return min(load(fraction_old, at), load(fraction_new, at)) < NEEDY or load(swept, share) <= 0.0
+
+
+@helper
+def is_in_domain(index, offset, grid_cells):
+    """Whether the cell at `offset` from the cell `index` of the grid is one of its cells."""
+    inside = True
+    for d in static_range(DIMENSIONS):
+        place = index[d] + offset[d]
+        inside = inside and place >= 0 and place < grid_cells[d]
+    return inside
+
+
+@helper
+def slope_of_fraction(old, new, at, step):
+    """How the open fractions grow along an axis."""
+    return (load(old, at + step) + load(new, at + step)) - (load(old, at - step) + load(new, at - step))
+
+
+@driver
+def find_masters(
+    begin, end, near, kind, master, fraction_old, fraction_new, swept, fields, aperture_old, aperture_new, offsets,
+    sequences, steps, shape, origin, extent, grid_cells,
+):  # fmt: skip
+    """master (blocks, D, Z, Y, X) = where the fluid of a needy cell finds its company, 0 if nowhere or not needy.
+
+    kind: FLUID if a cell has fluid or company, else COVERED. swept (blocks, fields, …): first the volume of the fluid.
+    offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
+    """
+    cells = shape[0] * shape[1] * shape[2]
+    for b in range(begin, end):
+        if near[b] == 0:
+            continue
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
+                    for d in static_range(DIMENSIONS):
+                        master[first + d * cells] = 0
+                    kind[at] = FLUID
+                    if not is_needy(fraction_old, fraction_new, swept, at, share):
+                        continue
+                    index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
+                    grad = tuple(
+                        slope_of_fraction(fraction_old, fraction_new, at, steps[d]) for d in static_range(DIMENSIONS)
+                    )
+                    steepness = sqrt(dot(grad, grad)) + 1e-12
+                    best, chosen = 0.0, -1
+                    for m in range(len(offsets)):
+                        if not is_in_domain(index, offsets[m], grid_cells):
+                            continue
+                        step = 0
+                        for d in static_range(DIMENSIONS):
+                            step += offsets[m, d] * steps[d]
+                        if is_needy(fraction_old, fraction_new, swept, at + step, share + step):
+                            continue
+                        away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
+                        length = sqrt(dot(away, away))
+                        cosine = dot(away, grad) / (length * steepness)
+                        score = load(fraction_new, at + step) * (2.0 + cosine) - 0.01 * length
+                        if score > best + 1e-12:
+                            is_open = False
+                            for s in range(len(sequences)):
+                                is_open = is_open or path_is_open(
+                                    aperture_old, aperture_new, at, offsets[m], sequences[s], steps, cells
+                                )
+                            if is_open:
+                                best, chosen = score, m
+                    if chosen >= 0:
+                        for d in static_range(DIMENSIONS):
+                            master[first + d * cells] = offsets[chosen, d]
+                    elif load(swept, share) <= 0.0:
+                        kind[at] = COVERED
+
+
+# ---- lists ----------------------------------------------------------------------------------------------------------
+
+
+@helper
+def is_whole(kind, fraction_old, fraction_new, swept, at, share):
+    """Whether a cell is like any other of the fluid, throughout the step."""
+    part = min(load(fraction_old, at), load(fraction_new, at))
+    return part == 1.0 and load(swept, share) == 1.0 and kind[at] == FLUID
+
+
+@helper
+def needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
+    """Whether the fluid stage alone does not do for a cell: something it reads is not whole."""
+    whole = is_whole(kind, fraction_old, fraction_new, swept, at, share)
+    for m in range(len(offsets)):
+        if whole:
+            step = 0
+            for d in static_range(DIMENSIONS):
+                step += offsets[m, d] * steps[d]
+            whole = is_whole(kind, fraction_old, fraction_new, swept, at + step, share + step)
+    for d in static_range(DIMENSIONS):
+        for side in range(-2, 3, 4):
+            if whole:
+                step = side * steps[d]
+                whole = is_whole(kind, fraction_old, fraction_new, swept, at + step, share + step)
+    return not whole
+
+
+@driver
+def sort_cells(
+    begin, end, near, kind, fraction_old, fraction_new, swept, fields, offsets, steps, shape, extent, counts
+):  # fmt: skip
+    """counts (blocks, 2) = cells in the band around the wall, and covered ones; a block without them is not near."""
+    cells = shape[0] * shape[1] * shape[2]
+    for b in range(begin, end):
+        counts[b, 0] = 0
+        counts[b, 1] = 0
+        if near[b] == 0:
+            continue
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    share = at + b * (fields - 1) * cells
+                    if kind[at] == COVERED:
+                        counts[b, 1] += 1
+                    elif needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
+                        counts[b, 0] += 1
+        if near[b] != CUT and counts[b, 0] + counts[b, 1] == 0:
+            near[b] = 0
+
+
+@driver
+def list_band(
+    begin, end, near, kind, fraction_old, fraction_new, swept, fields, offsets, steps, shape, extent, first, band,
+    covered,
+):  # fmt: skip
+    """Write the cells of the band and the covered ones, block by block, from the places first (blocks, 2) on."""
+    cells = shape[0] * shape[1] * shape[2]
+    for b in range(begin, end):
+        if near[b] == 0:
+            continue
+        n, m = first[b, 0], first[b, 1]
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    share = at + b * (fields - 1) * cells
+                    if kind[at] == COVERED:
+                        covered[m] = at
+                        m += 1
+                    elif needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
+                        band[n] = at
+                        n += 1

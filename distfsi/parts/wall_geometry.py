@@ -1,0 +1,161 @@
+"""Where the wall of a solid made of particles cuts the fluid's cells."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+from math import sqrt
+from types import SimpleNamespace
+
+import numpy as np
+
+from distfsi.device import cpu
+from distfsi.kernels import cut_geometry as kernels
+from distfsi.kernels import solid as particle_kernels
+from distfsi.mesh.blocks import Blocks
+from distfsi.parts.search import SearchCells, sort_particles
+
+SMOOTHING_RADIUS = 1.5  # in cells, of the kernel whose sum gives the distance
+COARSEST = 3.0  # particle spacings that this radius spans at least
+PROFILE_POINTS = 1025
+DRIVERS = (
+    particle_kernels.find_cells,
+    particle_kernels.fill_cells,
+    particle_kernels.order_cells,
+    kernels.fill_kernel,
+    kernels.thicken,
+    kernels.find_distances,
+    kernels.open_up,
+    kernels.find_masters,
+    kernels.sort_cells,
+    kernels.list_band,
+)
+
+
+def plane_profile(dimensions: int, points: int = PROFILE_POINTS) -> np.ndarray:
+    """Share (points,) of the Wendland C2 kernel of radius 1 on one side of a plane, from -1 to 1 across it."""
+    s = np.linspace(-1.0, 1.0, 8 * (points - 1) + 1)
+    if dimensions == 1:
+        density = (1.0 - np.abs(s)) ** 3 * (1.0 + 3.0 * np.abs(s))
+    else:
+        part = (np.arange(400) + 0.5) / 400
+        half = np.sqrt(1.0 - s**2)[:, None]
+        r = np.minimum(np.sqrt(s[:, None] ** 2 + (half * part) ** 2), 1.0)
+        density = (half * (1.0 - r) ** 4 * (1.0 + 4.0 * r) * (half * part) ** (dimensions - 2)).sum(axis=1)
+    share = np.append(0.0, np.cumsum(density[1:] + density[:-1]))
+    return 0.5 + 0.5 * (share - share[::-1])[::8] / share[-1]
+
+
+class WallGeometry:
+    """Open parts of cells and faces, before and after a step.
+
+    fractions  (old, new) fields (local blocks, 1, Z, Y, X): the part of each cell that is open, ghosts included
+    apertures  (old, new) fields (local blocks, D, Z, Y, X): the same of each cell's low face along every axis
+    near       (local blocks,) which blocks had particles near them or cells that were not whole
+    radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
+    """
+
+    def __init__(self, blocks: Blocks, team: cpu.Team, spacing: float, real: type):
+        """`spacing` [m] of the coarsest particles."""
+        self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
+        self.kernels: SimpleNamespace = cpu.build(DRIVERS, {"DIMENSIONS": D})
+        grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
+        self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
+        self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2)
+        self.search = max(self.radius, self.ball + 1.05 * h)
+        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.5 * h), 2.5 * h)
+        self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
+        self.fractions = tuple(np.ones((blocks.local_count, 1, *blocks.shape), real) for _ in range(2))
+        self.apertures = tuple(np.ones((blocks.local_count, D, *blocks.shape), real) for _ in range(2))
+        self.near = np.ones(blocks.local_count, dtype=np.uint8)
+        corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
+        self._distance = np.full((blocks.local_count, *corners), self.radius)
+        self._profile = plane_profile(D)
+        self._lower, self._upper, self._spacing = (np.array(a) for a in (grid.lower, grid.upper, grid.spacing))
+        self.shape, self.cells = np.array(blocks.shape), np.array(grid.cells)
+        self.steps = np.array([1, self.shape[2], self.shape[2] * self.shape[1]])
+        around = sorted((o for o in product((-1, 0, 1), repeat=D) if any(o)), key=lambda o: (sum(map(abs, o)), o))
+        self.offsets = np.array(around)
+        self._sequences = np.array(list(permutations(range(D))))
+
+    def sort(self, position: np.ndarray, key: np.ndarray) -> SearchCells:
+        """Particles by the cells of the grid they are in."""
+        D = self.blocks.grid.dimensions
+        size = float(self._spacing[:D].min())
+        return sort_particles(
+            self.kernels, self.team, position, key, self._lower[:D], self._upper[:D], size
+        )[1]  # fmt: skip
+
+    def fill(self, own: int, position: np.ndarray, volume: np.ndarray, bins: SearchCells) -> np.ndarray:
+        """Share (own,) of the kernel around each of the first `own` particles that is filled."""
+        filled = np.empty(own)
+        self.team.run(self.kernels.fill_kernel, own, filled, self.radius, volume, position, *bins)
+        return filled
+
+    def thicken(self, own, filled, position, volume, bins) -> np.ndarray:
+        """Radius (own,) [m] of the balls as which particles of thin bodies count; `filled` of all particles."""
+        ball = np.empty(own)
+        self.team.run(
+            self.kernels.thicken, own, ball, filled, self.radius, self.ball, volume, position, *bins
+        )  # fmt: skip
+        return ball
+
+    def cut(self, position: np.ndarray, volume: np.ndarray, ball: np.ndarray, bins: SearchCells) -> None:
+        """The new geometry becomes the old one, and that of these particles the new one."""
+        self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
+        blocks, count = self.blocks, self.blocks.local_count
+        self.team.run(
+            self.kernels.find_distances, count, self.near, self._distance.reshape(-1), self.radius,
+            self.search if ball.any() else self.radius, volume, ball, self._profile, position, *bins,
+            self.shape, self._spacing, blocks.origin, blocks.extent, self.cells,
+        )  # fmt: skip
+        before, after = self.parts
+        self.team.run(
+            self.kernels.open_up, count, self.near, self._distance.reshape(-1), before, after, self.faces[1],
+            self.shape, blocks.extent,
+        )  # fmt: skip
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Flat fractions, old and new."""
+        return tuple(field.reshape(-1) for field in self.fractions)
+
+    @property
+    def faces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Flat apertures, old and new."""
+        return tuple(field.reshape(-1) for field in self.apertures)
+
+    def cut_cells(self, block: int) -> tuple[np.ndarray, np.ndarray]:
+        """Places (n, D) [x first] in memory of a block's cells that are cut, and the middles (n, D) [m] of their open
+        corners, each by its distance from the wall."""
+        D, blocks, grid = self.blocks.grid.dimensions, self.blocks, self.blocks.grid
+        part, extent = self.fractions[1][block, 0], blocks.extent[block]
+        inner = tuple(slice(g, g + n) for g, n in zip(grid.ghosts[::-1], extent[::-1], strict=True))
+        place = np.argwhere((part[inner] > 0.0) & (part[inner] < 1.0))[:, ::-1] + grid.ghosts
+        weight, middle = np.zeros(len(place)), np.zeros((len(place), D))
+        for corner in product((0, 1), repeat=D):
+            at = place + np.pad(corner, (0, 3 - D))
+            free = np.maximum(self._distance[block][tuple(at.T[::-1])], 0.0)
+            x = self._lower[:D] + (blocks.origin[block] - grid.ghosts + at)[:, :D] * self._spacing[:D]
+            weight, middle = weight + free, middle + free[:, None] * x
+        return place, middle / weight[:, None]
+
+    def find_masters(self, kind: np.ndarray, master: np.ndarray, swept: np.ndarray) -> None:
+        """Which cells join which; kind (local blocks, 1, …), master (local blocks, D, …), swept (local blocks, k, …)."""
+        blocks = self.blocks
+        self.team.run(
+            self.kernels.find_masters, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),
+            *self.parts, swept.reshape(-1), swept.shape[1], *self.faces, self.offsets, self._sequences, self.steps,
+            self.shape, blocks.origin, blocks.extent, self.cells,
+        )  # fmt: skip
+
+    def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cells of the band around the wall, and the covered ones, block by block."""
+        count = self.blocks.local_count
+        cells = (self.near, kind.reshape(-1), *self.parts, swept.reshape(-1), swept.shape[1])
+        place = (self.offsets, self.steps, self.shape, self.blocks.extent)
+        counts = np.zeros((count, 2), dtype=np.int64)
+        self.team.run(self.kernels.sort_cells, count, *cells, *place, counts)
+        first = np.cumsum(counts, axis=0) - counts
+        band, covered = (np.empty(n, dtype=np.int64) for n in counts.sum(axis=0))
+        self.team.run(self.kernels.list_band, count, *cells, *place, first, band, covered)
+        return band, covered
