@@ -6,8 +6,8 @@ phase energies. Cells are named as in kernels/coupling.py.
 """
 
 from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.kernels.coupling import BOX, COVERED, FLUID, LINE, add_flux
-from distfsi.kernels.cut_geometry import is_in_domain, opening
+from distfsi.kernels.coupling import BOX, FLUID, LINE, add_flux
+from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening
 from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
 from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
 from distfsi.physics.subset import static_range
@@ -91,6 +91,36 @@ def add_content(total, U, swept, fraction, at, cells):
 
 
 @driver
+def evict(begin, end, band, moved, U, swept, kind, fraction, master, steps, shape):
+    """moved (n, VARIABLES + 3) = contents, phase energies and volumes of the band's cells after those that are shut
+    have handed theirs to a neighbour."""
+    cells = shape[0] * shape[1] * shape[2]
+    total = workspace(VARIABLES + 4)
+    for n in range(begin, end):
+        at = band[n]
+        for v in range(VARIABLES + 4):
+            total[v] = 0.0
+        if kind[at] == FLUID or way_to_master(master, at, cells, steps) == 0:
+            add_content(total, U, swept, fraction, at, cells)
+        for axis in range(DIMENSIONS):
+            for side in range(2):
+                way = (2 * side - 1) * steps[axis]
+                if kind[at + way] == SHUT and way_to_master(master, at + way, cells, steps) == -way:
+                    add_content(total, U, swept, fraction, at + way, cells)
+        for v in range(VARIABLES + 3):
+            moved[n, v] = total[v]
+
+
+@driver
+def put_moved(begin, end, band, moved, U, swept, shape):
+    """Store the contents and volumes of the band."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        put_content(U, swept, band[n], cells, tuple(moved[n, v] for v in static_range(VARIABLES + 2)))
+        store(swept, share_at(band[n], cells), moved[n, VARIABLES + 2])
+
+
+@driver
 def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, shape, origin, grid_cells):
     """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs."""
     cells = shape[0] * shape[1] * shape[2]
@@ -148,7 +178,7 @@ def put_rest(begin, end, covered, U, swept, rest, shape):
 @helper
 def open_between(kind, old, new, at, axis, step, cells):
     """Open part of the face between a cell and the one a `step` below along the axis; no fluid enters covered cells."""
-    both = kind[at] != COVERED and kind[at - step] != COVERED
+    both = kind[at] == FLUID and kind[at - step] == FLUID
     return opening(old, new, at, axis, cells) if both else 0.0
 
 

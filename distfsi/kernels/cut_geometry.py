@@ -12,7 +12,7 @@ are seen in the mirror of its sides.
 from math import floor, sqrt
 
 from distfsi.device.markers import driver, helper, load, workspace
-from distfsi.kernels.coupling import COVERED, FLUID, cell_at
+from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at
 from distfsi.kernels.gather import any_particle, bins_around, sum_particles
 from distfsi.physics.apertures import open_cell, open_face
 from distfsi.physics.immersed import immersed_weight
@@ -20,9 +20,12 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
 
-FILLED = 0.97  # of the kernel: a body is thick where a particle is as deep as this
-FADING = 0.1  # of the kernel: over which the balls vanish as a body becomes thick
+FILLED = 0.99  # of the kernel: a body is thick where a particle is as deep as this
+FADING = 0.05  # of the kernel: over which the balls vanish as a body becomes thick
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
+SLIVER = 0.1  # of a cell: with less and without a neighbour to join the fluid is shut in
+
+SHUT = DEEP  # a cell whose faces are closed, with fluid in it
 
 # What a block is: far from all particles and whole; near particles or else; with cells that are not whole.
 NEAR, CUT = 1, 2
@@ -210,9 +213,15 @@ def path_is_open(old, new, at, offset, sequence, steps, cells):
 
 
 @helper
+def smaller(old, new, at):
+    """The smaller of a cell's open parts before and after the step."""
+    return min(load(old, at), load(new, at))
+
+
+@helper
 def is_needy(fraction_old, fraction_new, swept, at, share):
     """Whether the fluid in a cell has to join a neighbour's."""
-    return min(load(fraction_old, at), load(fraction_new, at)) < NEEDY or load(swept, share) <= 0.0
+    return smaller(fraction_old, fraction_new, at) < NEEDY or load(swept, share) <= 0.0
 
 
 @helper
@@ -238,7 +247,8 @@ def find_masters(
 ):  # fmt: skip
     """master (blocks, D, Z, Y, X) = where the fluid of a needy cell finds its company, 0 if nowhere or not needy.
 
-    kind: FLUID if a cell has fluid or company, else COVERED. swept (blocks, fields, …): first the volume of the fluid.
+    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED.
+    The fluid of a SHUT cell has to move to the neighbour that is its `master`, if it has one. swept (blocks, fields, …): first the volume of the fluid.
     offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
     """
     cells = shape[0] * shape[1] * shape[2]
@@ -286,6 +296,21 @@ def find_masters(
                             master[first + d * cells] = offsets[chosen, d]
                     elif load(swept, share) <= 0.0:
                         kind[at] = COVERED
+                    elif smaller(fraction_old, fraction_new, at) < SLIVER:
+                        kind[at] = SHUT
+                        most = SLIVER
+                        for axis in range(DIMENSIONS):
+                            for side in range(2):
+                                way = 2 * side - 1
+                                there = at + way * steps[axis]
+                                part = smaller(fraction_old, fraction_new, there)
+                                face = at + side * steps[axis]
+                                inside = index[axis] + way >= 0 and index[axis] + way < grid_cells[axis]
+                                if inside and part >= most and load(swept, share + way * steps[axis]) > 0.0:
+                                    if opening(aperture_old, aperture_new, face, axis, cells) > 0.0:
+                                        most = part
+                                        for d in range(DIMENSIONS):
+                                            master[first + d * cells] = way if d == axis else 0
 
 
 # ---- lists ----------------------------------------------------------------------------------------------------------
@@ -294,8 +319,8 @@ def find_masters(
 @helper
 def is_whole(kind, fraction_old, fraction_new, swept, at, share):
     """Whether a cell is like any other of the fluid, throughout the step."""
-    part = min(load(fraction_old, at), load(fraction_new, at))
-    return part == 1.0 and load(swept, share) == 1.0 and kind[at] == FLUID
+    whole = smaller(fraction_old, fraction_new, at) == 1.0
+    return whole and load(swept, share) == 1.0 and kind[at] == FLUID
 
 
 @helper

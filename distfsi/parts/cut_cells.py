@@ -10,6 +10,7 @@ from distfsi.device import cpu
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_forces
+from distfsi.kernels.cut_geometry import SHUT
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
@@ -25,6 +26,8 @@ LARGEST_MOVE = 0.45  # of a cell in a step, before the forces between particles 
 PARTICLE_DRIVERS = (cut_forces.see_particles, cut_forces.find_debts, immersed_kernels.push)
 FLUID_DRIVERS = (
     kernels.take_contents,
+    kernels.evict,
+    kernels.put_moved,
     kernels.mix,
     kernels.put_mixed,
     kernels.put_rest,
@@ -135,8 +138,6 @@ class CutCells:
     def before_stage(self, stage: Stage) -> None:
         """Collective. Mix what belongs together in the stage's input, and leave it as states."""
         U, first = self.fluid.input_of(stage), stage.number == 0
-        if first:
-            self._run(self.fluid_kernels.take_contents, U, self.swept.reshape(-1), self.wall.shape)
         self._mix(U, self.wall.parts[0 if first else 1])
         if first:
             block, cell = self._places()
@@ -217,8 +218,9 @@ class CutCells:
         """The cells cut by this rank's particles and those around, which have moved from `start` to `position`."""
         c, D, wall = self.solid.columns, self._dimensions, self.wall
         vector = tuple((a,) for a in range(D))
-        inside = self._is_inside(start) & self._is_inside(position)
-        volume, self._own_mass = (np.where(inside, x, 0.0) for x in (c["mass"] / c["density"], c["mass"]))
+        volume = c["mass"] / c["density"]
+        self._own_mass = np.where(self._part_inside(start, volume) > 0.0, c["mass"], 0.0)
+        volume = volume * self._part_inside(position, volume)
         images = wall.search + 0.5 * self._spacing[:D].max()
         self._plan = plan = self._particles.ghosts(
             start, c["id"], wall.reach, image_reach=images, mirrors=MIRRORS
@@ -231,18 +233,39 @@ class CutCells:
         volume, bins = volume[:, None], wall.sort(position, plan.key)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((),))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((),))])
+        self.ball, self.filled = ball, filled
         wall.cut(position, volume, ball, bins)
 
-    def _is_inside(self, position: np.ndarray) -> np.ndarray:
-        """Which of the positions (n, D) are in the domain."""
+    def _part_inside(self, position: np.ndarray, volume: np.ndarray) -> np.ndarray:
+        """Part (n,) of the cubes of `volume` (n,) around the positions (n, D) that is in the domain."""
         grid, D = self.blocks.grid, self._dimensions
-        return ((position >= grid.lower[:D]) & (position <= grid.upper[:D])).all(axis=1)
+        side = np.maximum(volume, 1e-300)[:, None] ** (1.0 / D)
+        depth = np.minimum(position - grid.lower[:D], np.array(grid.upper[:D]) - position)
+        return np.clip(0.5 + depth / side, 0.0, 1.0).prod(axis=1)
 
     def _find_company(self) -> None:
         """Which cells join which, and the lists of the band's and the covered cells."""
         self.wall.find_masters(self.kind, self._master, self.swept)
         self._exchange(self.kind, np.array([-1]), immersed_kernels.FLUID)
         self._exchange(self._master, np.arange(self._dimensions), 0)
+        self._band, self._covered = self.wall.lists(self.kind, self.swept)
+        self._evict()
+
+    def _evict(self) -> None:
+        """Collective. States of the band become contents; those of cells that are shut move, and these are covered."""
+        U, swept, shape, k = self.fluid.state, self.swept.reshape(-1), self.wall.shape, self.fluid_kernels
+        self._run(k.take_contents, U, swept, shape)
+        self._exchange_state(U)
+        self._exchange_swept()
+        moved = np.empty((len(self._band), self.model.variables + 3), U.dtype)
+        self._run(
+            k.evict, moved, U, swept, self.kind.reshape(-1), self.wall.parts[0], self._master.reshape(-1),
+            self.wall.steps, shape,
+        )  # fmt: skip
+        self._run(k.put_moved, moved, U, swept, shape)
+        left = (self.kind == SHUT) & (self._master != 0).any(axis=1, keepdims=True)
+        self.kind[left] = immersed_kernels.COVERED
+        self._master[np.broadcast_to(left, self._master.shape)] = 0
         self._band, self._covered = self.wall.lists(self.kind, self.swept)
 
     def _see(self, velocity: np.ndarray, mean: np.ndarray) -> None:
