@@ -74,7 +74,7 @@ def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: Time
         coupling.before_stage(stage)
         fluid.advance_stage(stage, dt)
         coupling.after_stage(stage, dt)
-    gain = solid.kick(coupling.impulse())  # Eq. 34
+    gain = solid.push(coupling.impulse())  # Eq. 34
     coupling.book_work(gain)
     solid.migrate()
     return dt

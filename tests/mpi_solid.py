@@ -57,7 +57,10 @@ def step(part, impulse=None):
     """One step of the largest stable size; `impulse(columns)` -> impulses [N s]. Returns the step and the work done."""
     part.prepare()
     dt = -part.communicator.maximum(np.array([-part.time_step()[0]]))[0]
-    part.advance(dt, None if impulse is None else impulse(part.columns))
+    given = None if impulse is None else impulse(part.columns)
+    part.advance(dt)
+    if impulse is not None:
+        part.push(given)
     work = part.blocks.sum(part.work[:, None])[0]
     part.migrate()
     return dt, work

@@ -274,7 +274,8 @@ def book_sides(
     begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, weights
 ):  # fmt: skip
     """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
-    1 high), beyond what leaves there, for the cells `chosen`. weights (D,): share of the stage * dt * area of a face."""
+    1 high), beyond what leaves there, for the cells `chosen`. weights (D,): share of the stage * dt * area of a face.
+    """
     cells = shape[0] * shape[1] * shape[2]
     P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
     for m in range(begin, end):

@@ -59,8 +59,8 @@ def find_debts(begin, end, band, debt, impulse, gain):
     """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity
     before: half of it times the `gain` (n, D) [m/s] of the particles that it sees."""
     for n in range(begin, end):
-        J, dv = tuple(impulse[n, d] for d in static_range(DIMENSIONS)), tuple(gain[n, d] for d in static_range(DIMENSIONS))
-        store(debt, band[n], 0.5 * dot(J, dv))
+        J = tuple(impulse[n, d] for d in static_range(DIMENSIONS))
+        store(debt, band[n], 0.5 * dot(J, tuple(gain[n, d] for d in static_range(DIMENSIONS))))
 
 
 @driver

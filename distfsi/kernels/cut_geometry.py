@@ -9,7 +9,7 @@ Cells are named as in kernels/coupling.py. Cells around a block are looked at in
 are seen in the mirror of its sides.
 """
 
-from math import floor, sqrt
+from math import sqrt
 
 from distfsi.device.markers import driver, helper, load, workspace
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at
@@ -247,8 +247,9 @@ def find_masters(
 ):  # fmt: skip
     """master (blocks, D, Z, Y, X) = where the fluid of a needy cell finds its company, 0 if nowhere or not needy.
 
-    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED.
-    The fluid of a SHUT cell has to move to the neighbour that is its `master`, if it has one. swept (blocks, fields, …): first the volume of the fluid.
+    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED. The fluid of a SHUT
+    cell has to move to the neighbour that is its `master`, if it has one. swept (blocks, fields, …): first the volume
+    of the fluid.
     offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
     """
     cells = shape[0] * shape[1] * shape[2]

@@ -100,8 +100,8 @@ class ParticleExchange:
         """Collective. Who needs copies of which particles, and the images at symmetry planes.
 
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
-        at the ends of the grid extend to infinity. Particles and ghosts within `image_reach` [m], by default `reach`, of
-        the domain's ends of a kind among `mirrors` have images.
+        at the ends of the grid extend to infinity. Particles and ghosts within `image_reach` [m], by default `reach`,
+        of the domain's ends of a kind among `mirrors` have images.
         `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`,
         on all ranks or none, holds the keys (see GhostPlan) of particles and images that this rank needs wherever they
         are. Raises InputError when a particle could have two images along one axis.

@@ -190,7 +190,7 @@ class Coupling:
         return impulse
 
     def book_work(self, gain: np.ndarray) -> None:
-        """Enter the work of the impulse on the solid, after solid.kick() gave particles `gain` (own, D) [m/s]."""
+        """Enter the work of the impulse on the solid, after solid.push() gave particles `gain` (own, D) [m/s]."""
         self._ledger["wall"][:, -1] += self.solid.work
 
     # ---- parts of it ------------------------------------------------------------------------------------------------

@@ -72,6 +72,7 @@ class CutCells:
         self.swept = np.ones((blocks.local_count, 3 if model.phases == 2 else 1, *blocks.shape), real)
         self._master = blocks.allocate(grid.dimensions, np.int8)
         self._kick, self._debt = blocks.allocate(grid.dimensions), blocks.allocate(1)
+        self._band = np.empty(0, dtype=np.int64)
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         self._find_sides()
         c = solid.columns
@@ -178,7 +179,7 @@ class CutCells:
 
     def impulse(self) -> np.ndarray:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step."""
-        D, P, blocks, grid = self._dimensions, self.model.phases, self.blocks, self.blocks.grid
+        D, P, blocks = self._dimensions, self.model.phases, self.blocks
         impulse = self._impulse * self._cell_volume
         self._run(self.fluid_kernels.spread_impulse, impulse, self._inertia, self._kick, self.wall.shape)
         self._exchange(self._kick, np.arange(D), 0.0)
@@ -196,7 +197,7 @@ class CutCells:
         return given
 
     def book_work(self, gain: np.ndarray) -> None:
-        """Collective, after solid.kick(), which gave particles `gain` (own, D) [m/s]: the fluid pays for it."""
+        """Collective, after solid.push(), which gave particles `gain` (own, D) [m/s]: the fluid pays for it."""
         (velocity,) = self._plan.exchange([(gain, tuple((a,) for a in range(self._dimensions)))])
         mean = np.empty_like(self._velocity)
         self._see(velocity, mean)
@@ -233,7 +234,6 @@ class CutCells:
         volume, bins = volume[:, None], wall.sort(position, plan.key)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((),))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((),))])
-        self.ball, self.filled = ball, filled
         wall.cut(position, volume, ball, bins)
 
     def _part_inside(self, position: np.ndarray, volume: np.ndarray) -> np.ndarray:
@@ -327,6 +327,10 @@ class CutCells:
     def volume(self) -> np.ndarray:
         """(local blocks, Z, Y, X) the part of each cell that its fluid fills."""
         return self.swept[:, 0]
+
+    def workload(self) -> np.ndarray:
+        """(local blocks,) cells in the band around the wall."""
+        return np.bincount(self._places()[0], minlength=self.blocks.local_count).astype(float)
 
     def snapshot(self) -> Snapshot:
         """What a restart needs: the volumes, and the books."""

@@ -60,7 +60,7 @@ class WallGeometry:
         self.kernels: SimpleNamespace = cpu.build(DRIVERS, {"DIMENSIONS": D})
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
-        self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2)
+        self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + 0.05 * h
         self.search = max(self.radius, self.ball + 1.05 * h)
         self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.5 * h), 2.5 * h)
         self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
@@ -140,7 +140,7 @@ class WallGeometry:
         return place, middle / weight[:, None]
 
     def find_masters(self, kind: np.ndarray, master: np.ndarray, swept: np.ndarray) -> None:
-        """Which cells join which; kind (local blocks, 1, …), master (local blocks, D, …), swept (local blocks, k, …)."""
+        """Which cells join which: kind (local blocks, 1, …) and master (local blocks, D, …); swept (…, k, …)."""
         blocks = self.blocks
         self.team.run(
             self.kernels.find_masters, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),

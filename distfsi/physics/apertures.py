@@ -84,6 +84,4 @@ def open_cell(corners):
     if DIMENSIONS == 2:
         return open_square(corners[0], corners[1], corners[2], corners[3])
     if DIMENSIONS == 3:
-        return open_cube(
-            corners[0], corners[1], corners[2], corners[3], corners[4], corners[5], corners[6], corners[7]
-        )
+        return open_cube(corners[0], corners[1], corners[2], corners[3], corners[4], corners[5], corners[6], corners[7])

@@ -262,7 +262,7 @@ class CouplingInput(Table):
 
     scheme: description.CouplingScheme = Field(
         "cut_cells",
-        description='"cut_cells": conservative, tight and quiet; "paper": covered cells take their state from the fluid',
+        description='"cut_cells": conservative, tight and quiet; "paper": covered cells copy the fluid',
     )
 
 

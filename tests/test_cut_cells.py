@@ -1,0 +1,255 @@
+"""Cut cells: geometry, uniform flow kept, pistons, closed books, thin plates that do not leak."""
+
+from itertools import product
+from math import sqrt
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from distfsi.device.emit import plain
+from distfsi.parts import solid as solid_part
+from distfsi.parts.wall_geometry import plane_profile
+from distfsi.physics import apertures
+from distfsi.scene.description import Ball, Box, HalfSpace
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas
+
+HEAVY = 1e15  # so dense that nothing changes a body's velocity
+OPEN = ("outflow", "outflow")
+
+
+def coupled(bodies, regions, lower, upper, cells, kinds=None, **method):
+    return Coupled(bodies, regions, lower, upper, cells, kinds, scheme="cut_cells", **method)
+
+
+def rigid(shape, spacing, velocity):
+    """A body that keeps its velocity."""
+    return body(shape, spacing, HEAVY, velocity, stiffness=1.0)
+
+
+def volumes(case):
+    """(z, y, x) of the whole grid."""
+    return case.grid_of(case.coupling.swept)[0]
+
+
+def primitives(case):
+    return np.array(case.fluid.model.formula("primitives")(tuple(case.grid_of(case.fluid.state))))
+
+
+# ---- geometry -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_open_parts_are_exact_for_plane_walls(dimensions):
+    """Against the mean over many points; and nothing is open, or everything, without a cut."""
+    rng = np.random.default_rng(5)
+    open_cell = plain(apertures.open_cell, {"DIMENSIONS": dimensions})
+    open_face = plain(apertures.open_face, {"DIMENSIONS": dimensions})
+    points = (np.stack(np.meshgrid(*[np.arange(40)] * dimensions), -1).reshape(-1, dimensions) + 0.5) / 40
+    corners = np.array([c[::-1] for c in product((0, 1), repeat=dimensions)])
+    for _ in range(40):
+        normal, through = rng.normal(size=dimensions), rng.random(dimensions)
+        distance = (corners - through) @ normal
+        assert open_cell(tuple(distance)) == pytest.approx(((points - through) @ normal > 0.0).mean(), abs=0.02)
+        on_face = distance[corners[:, 0] == 0]
+        face = np.column_stack([np.zeros(len(points)), points[:, 1:]])
+        assert open_face(tuple(on_face)) == pytest.approx(((face - through) @ normal > 0.0).mean(), abs=0.02)
+        for sign in (1.0, -1.0):
+            assert open_cell(tuple(sign * (np.abs(distance) + 1e-9))) == (sign > 0.0)
+    distance = rng.normal(size=2**dimensions)
+    assert open_cell(tuple(distance)) + open_cell(tuple(-distance)) == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3])
+def test_profile_of_the_kernel_is_that_of_half_spaces(dimensions):
+    profile = plane_profile(dimensions)
+    assert profile[0] == 0.0 and profile[-1] == 1.0 and profile[512] == pytest.approx(0.5, abs=1e-12)
+    points = (np.stack(np.meshgrid(*[np.arange(60)] * dimensions), -1).reshape(-1, dimensions) + 0.5) / 30 - 1.0
+    q = np.minimum(np.sqrt((points**2).sum(axis=1)), 1.0)
+    weight = (1.0 - q) ** 3 * (1.0 + 3.0 * q) if dimensions == 1 else (1.0 - q) ** 4 * (1.0 + 4.0 * q)
+    s = np.linspace(-1.0, 1.0, 31)
+    share = [weight[points[:, 0] < x].sum() / weight.sum() for x in s]
+    assert np.interp(s, np.linspace(-1.0, 1.0, len(profile)), profile) == pytest.approx(share, abs=2e-3)
+
+
+# ---- uniform flow ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "phases", "moves"),
+    [
+        (1, AIR, True),
+        (2, AIR, True),
+        (2, AIR, False),
+        (2, AIR_AND_WATER, True),
+        pytest.param(3, AIR, True, marks=pytest.mark.full),
+        pytest.param(3, AIR_AND_WATER, True, marks=pytest.mark.full),
+    ],
+)
+def test_uniform_flow_stays_uniform_around_particles_that_move_with_it(dimensions, phases, moves):
+    D, n = dimensions, {1: 60, 2: 32, 3: 16}[dimensions]
+    u = (1.0, 0.5, 0.25)[:D] if moves else (0.0,) * D
+    ball = rigid(Ball((0.4,) * D, 0.2), 0.5 / n, u)
+    regions = [(gas(1.4, 1.0, u), None)]
+    if len(phases) == 2:
+        regions.append((gas(5.0, 1.0, u, 1), HalfSpace((0.45, *(0.0,) * (D - 1)), (-1.0, *(0.2,) * (D - 1)))))
+    case = coupled([ball], regions, (0.0,) * D, (1.0,) * D, (n,) * D, (OPEN,) * D, phases=phases, cfl=0.5)
+    for _ in range(20):
+        case.step()
+    W, P = primitives(case)[:, volumes(case) > 0.0], len(phases)
+    assert np.abs(W[P + D] - 1.0).max() < 1e-12
+    assert np.abs(W[P : P + D] - np.array(u)[:, None]).max() < 1e-12
+
+
+# ---- pistons --------------------------------------------------------------------------------------------------------
+
+
+def behind_piston(speed):
+    """Pressure and density in front of a piston in gas (gamma 1.4) with rho = 1.4, p = 1."""
+    if speed > 0.0:
+        b = 1.4 * 1.2 * speed**2
+        p = 1.0 + 0.5 * b + sqrt(0.25 * b * b + 1.96 * speed**2)
+        return p, 1.4 * (2.4 * p + 0.4) / (0.4 * p + 2.4)
+    q = 1.0 + 0.2 * speed
+    return q**7, 1.4 * q**5
+
+
+@pytest.mark.parametrize("cfl", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_both_faces_of_a_piston_feel_a_steady_pressure(speed, cfl):
+    """The shock before it and the fan behind it; cells are covered and come free all the time."""
+    h, n, T = 0.01, 300, 0.8 / (speed + 1.0)
+    piston = rigid(Box((0.7,), (1.2,)), 0.5 * h, (speed,))
+    case = coupled([piston], [(gas(1.4, 1.0, (0,)), None)], (0.0,), (3.0,), (n,), (OPEN,), block=100, cfl=cfl)
+    before, time, force = case.balance(), 0.0, []
+    while time < T:
+        dt, impulse = case.step()
+        time += dt
+        if time > 0.4 * T:
+            force.append(-impulse[0] / dt)
+    (p, rho), (p_behind, _) = behind_piston(speed), behind_piston(-speed)
+    assert np.abs(np.array(force) / (p - p_behind) - 1.0).max() < 5e-3
+    x, W = (np.arange(n) + 0.5) * h, primitives(case)[:, 0, 0]
+    face = 1.2 + speed * time
+    shock = 1.2 + time * (0.6 * speed + sqrt(0.36 * speed**2 + 1.0))
+    plateau = (x > face + 3 * h) & (x < shock - 10 * h)
+    assert W[2, plateau].mean() == pytest.approx(p, rel=2e-3)
+    assert W[0, plateau].mean() == pytest.approx(rho, rel=1e-2)
+    behind = (x < 0.7 + speed * time - 3 * h) & (x > 0.7 + speed * time - 10 * h)
+    assert W[2, behind].mean() == pytest.approx(p_behind, rel=1e-2)
+    assert abs(case.balance()[0] - before[0]) < 1e-13
+
+
+def test_a_piston_that_leaves_a_near_vacuum_leaves_no_negative_state():
+    piston = rigid(Box((1.5,), (2.5,)), 0.005, (-4.0,))
+    case = coupled([piston], [(gas(1.4, 1.0, (0,)), None)], (0.0,), (4.0,), (400,), (OPEN,), block=100, cfl=0.5)
+    before = case.balance()[0]
+    while case.simulation.time < 0.3:
+        case.step()
+    W = primitives(case)[:, volumes(case) > 0.0]
+    assert W[0].min() > 0.0 and W[2].min() > 0.0
+    assert abs(case.balance()[0] - before) < 1e-12
+
+
+# ---- books ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("thickness", [1.0, 0.05, 0.025])
+def test_a_free_plate_flies_as_the_simple_wave_says(thickness):
+    """Gas (gamma 1.4, p = rho = 1) drives a plate of mass 1 into a vacuum: u(0.5) = 0.39093, exact; 20, 1 and 1/2
+    cells thick."""
+    h = 0.05
+    plate = body(Box((0.0,), (thickness,)), min(0.5 * h, 0.5 * thickness), 1.0 / thickness, (0,), stiffness=100.0)
+    driver = (gas(1.0, 1.0, (0,)), Box((-2.0,), (0.5 * thickness,)))
+    case = coupled([plate], [(gas(1e-7, 1e-8, (0,)), None), driver], (-2.0,), (2.0,), (80,), block=80, cfl=0.4)
+    before = case.balance()
+    while case.simulation.time < 0.5:
+        dt, impulse = case.step()
+    velocity = case.solid.totals()["momentum"][0] - (case.simulation.time - 0.5) * impulse[0] / dt
+    assert velocity == pytest.approx(0.3909302681, rel=5e-3)
+    assert np.abs(case.balance() - before).max() < 1e-12
+    assert all(np.abs(made).max() < 1e-14 for made in case.coupling.ledger().values())
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "phases"), [(1, AIR), (2, AIR), (2, AIR_AND_WATER), pytest.param(3, AIR, marks=pytest.mark.full)]
+)
+def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
+    """Each mass, momentum and energy of fluid and solid in a closed box; the coupling makes nothing."""
+    D, cells = dimensions, (24, 16, 16)[:dimensions]
+    ball = body(Ball((0.51, 0.41, 0.41)[:D], 0.2), 0.025, 3.0, (0.7, 0.3, -0.2)[:D])
+    still, hot = gas(1.0, 1.0, (0,) * D), gas(2.0, 5.0, (0,) * D, len(phases) - 1)
+    regions = [(still, None), (hot, Box((0.0,) * D, (0.2,) * D))]
+    case = coupled([ball], regions, (0.0,) * D, tuple(0.05 * n for n in cells), cells, phases=phases)
+    before = case.balance()
+    for _ in range(40):
+        case.step()
+    assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
+    assert all(np.abs(made).max() < 1e-13 for made in case.coupling.ledger().values())
+
+
+# ---- thin plates ----------------------------------------------------------------------------------------------------
+
+
+def low_side(case):
+    """Mass on the low side of a plate and in what is shut in, and whether gas gets across."""
+    volume, aperture = volumes(case), case.grid_of(case.coupling.wall.apertures[1])
+    index, edges = np.arange(volume.size).reshape(volume.shape), []
+    for axis in range(case.fluid.model.dimensions):
+        low, high = (np.delete(index, end, axis=2 - axis).ravel() for end in (-1, 0))
+        passable = (aperture[axis].ravel()[high] > 0.0) & (volume.ravel()[low] > 0.0) & (volume.ravel()[high] > 0.0)
+        edges.append(np.stack([low[passable], high[passable]]))
+    edges = np.hstack(edges)
+    graph = coo_matrix((np.ones(edges.shape[1]), edges), shape=(volume.size,) * 2)
+    _, part = connected_components(graph, directed=False)
+    mass = (case.grid_of(case.fluid.state)[0] * volume).ravel()
+    shut_in = mass[(part != part[0]) & (part != part[-1])].sum()
+    return mass[part == part[-1]].sum(), shut_in, part[0] == part[-1]
+
+
+def plate_between(monkeypatch, normal, thickness, speed, n):
+    """A plate across a closed box, high pressure (1e4 : 1) before it and low behind it; thickness in cells."""
+    normal = np.array(normal) / np.linalg.norm(normal)
+    D, h = len(normal), 1.0 / n
+    layers = max(1, round(2 * thickness))
+    spacing = min(0.5, thickness) * h
+    along = (np.arange(-int(1.1 / spacing), int(1.1 / spacing)) + 0.5) * spacing
+    across = ((np.arange(layers) + 0.5) / layers - 0.5) * thickness * h
+    frame = np.linalg.qr(np.column_stack([normal, np.eye(D)[:, : D - 1]]))[0]
+    frame[:, 0] = normal
+    middle = np.full(D, 0.48) + 0.013 * h
+    lattice = np.stack([x.ravel() for x in np.meshgrid(across, *[along] * (D - 1))], axis=1)
+    position = lattice @ frame.T + middle
+    position = position[((position > -0.15) & (position < 1.15)).all(axis=1)]
+    volume = np.full(len(position), thickness * h / layers * spacing ** (D - 1))
+    monkeypatch.setattr(solid_part, "pack", lambda *arguments: (position, volume))
+    plate = rigid(Box((0.0,) * D, (1.0,) * D), spacing, tuple(speed * normal))
+    regions = [(gas(1e-3, 1e-4, (0,) * D), None), (gas(1.0, 1.0, (0,) * D), HalfSpace(tuple(middle), tuple(normal)))]
+    return coupled([plate], regions, (0.0,) * D, (1.0,) * D, (n,) * D, block=n)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3, -0.3])
+@pytest.mark.parametrize("normal", [(1.0, 0.0), (2.0, 1.0), (1.0, 1.0)])
+@pytest.mark.parametrize("thickness", [0.5, 1.0, 2.0])
+def test_nothing_leaks_through_a_thin_plate(monkeypatch, thickness, normal, speed):
+    case = plate_between(monkeypatch, normal, thickness, speed, 16)
+    before = low_side(case)[0]
+    for _ in range(20):
+        case.step()
+        mass, shut_in, open_way = low_side(case)
+        assert not open_way
+        assert mass / before - 1.0 < 1e-12 and 1.0 - (mass + shut_in) / before < 1e-12
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("speed", [0.0, 0.3, -0.3])
+@pytest.mark.parametrize("thickness", [0.5, 1.0])
+def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(monkeypatch, thickness, speed):
+    case = plate_between(monkeypatch, (1.0, 0.63, 0.41), thickness, speed, 14)
+    before = low_side(case)[0]
+    for _ in range(12):
+        case.step()
+        mass, shut_in, open_way = low_side(case)
+        assert not open_way
+        assert mass / before - 1.0 < 1e-12 and 1.0 - (mass + shut_in) / before < 1e-12
