@@ -150,7 +150,9 @@ def main():
             digests.append(coupled.digest())
         assert digests[0] == digests[1], case.__name__
         if communicator.rank == 0:
-            print(scheme, case.__name__, digests[0], [amounts.tobytes().hex() for amounts in ledger.values()], flush=True)
+            print(
+                scheme, case.__name__, digests[0], [amounts.tobytes().hex() for amounts in ledger.values()], flush=True
+            )
 
 
 if __name__ == "__main__":
