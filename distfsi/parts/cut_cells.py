@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.device import cpu
+from distfsi.device.seam import Device
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_forces
@@ -53,15 +53,15 @@ class CutCells:
     causes = ("wall", "sides")
     reach = 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: cpu.Team):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         real = np.dtype(scene.fluid.precision).type
         self.wall = WallGeometry(blocks, team, max(body.spacing for body in scene.solid.bodies), real)
-        self.kernels = cpu.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
-        self.fluid_kernels = cpu.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
-        self.exchange = GhostExchange(blocks, cpu.build([copy_regions], {}).copy_regions)
+        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
+        self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
+        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
         self._particles = ParticleExchange(blocks)
         self._lower, self._spacing = np.array(grid.lower), np.array(grid.spacing)
         self._cell_volume = float(self._spacing.prod())

@@ -118,9 +118,9 @@ class Fluid:
         """The state that a stage starts from, on the device."""
         return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].there
 
-    def output_of(self, stage: Stage) -> np.ndarray:
+    def output_of(self, stage: Stage) -> Any:
         """Where a stage leaves its state; asked before the stage."""
-        return self._buffers[_output(stage.number)]
+        return self._buffers[_output(stage.number)].there
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""

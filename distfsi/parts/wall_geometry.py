@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from distfsi.device import cpu
+from distfsi.device.seam import Device
 from distfsi.kernels import cut_geometry as kernels
 from distfsi.kernels import solid as particle_kernels
 from distfsi.mesh.blocks import Blocks
@@ -54,10 +54,10 @@ class WallGeometry:
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
     """
 
-    def __init__(self, blocks: Blocks, team: cpu.Team, spacing: float, real: type):
+    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type):
         """`spacing` [m] of the coarsest particles."""
         self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
-        self.kernels: SimpleNamespace = cpu.build(DRIVERS, {"DIMENSIONS": D})
+        self.kernels: SimpleNamespace = team.build(DRIVERS, {"DIMENSIONS": D})
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
         self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + 0.05 * h
