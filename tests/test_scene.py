@@ -245,7 +245,8 @@ tile_cells = [0, 1]
 
 def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     sections = ", ".join(
-        f"'{name}'" for name in ("title", "domain", "time", "fluid", "solid", "output", "gauges", "performance")
+        f"'{name}'"
+        for name in ("title", "domain", "time", "fluid", "solid", "output", "gauges", "coupling", "performance")
     )
     assert faults(BROKEN) == [
         f"titel (line 1): unknown key; expected one of {sections}; did you mean 'title'?",
