@@ -142,7 +142,7 @@ class CutCells:
         self._mix(U, self.wall.parts[0 if first else 1])
         if first:
             block, cell = self._places()
-            self._start_volume[:] = self.swept.reshape(*self.swept.shape[:2], -1)[block, 0, cell]
+            self._start_volume[:] = self.swept.reshape(*self.swept.shape[:2], self.wall.shape.prod())[block, 0, cell]
         self.fluid.wake(self.wall.near > 0)
         self._start, self._input, self._output = self.fluid.state, U, self.fluid.output_of(stage)
 
