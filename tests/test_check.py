@@ -122,7 +122,7 @@ def test_fields_are_those_of_the_run(scene):
     cells, _ = simulation.outputs()
     made = simulation.fluid.memory() + sum(field.nbytes for field in cells.values())
     if simulation.coupling:
-        made += simulation.coupling.kind.nbytes + simulation.coupling.kind.size * 8 * scene.domain.dimensions
+        made += simulation.coupling.memory()
         assert resources.particles == len(simulation.solid.columns["id"])
     assert resources.field_bytes(simulation.blocks) == made
 

@@ -225,6 +225,10 @@ class Coupling:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
         return self.kind[:, 0] >= kernels.COVERED
 
+    def memory(self) -> int:
+        """Bytes of this rank's fields."""
+        return self.kind.nbytes + self._kick.nbytes
+
     def workload(self) -> np.ndarray:
         """(local blocks,) covered cells that fluxes see."""
         return np.bincount(self._in_block(self._covered)[0], minlength=self.blocks.local_count).astype(float)

@@ -328,6 +328,19 @@ class CutCells:
         """(local blocks, Z, Y, X) the part of each cell that its fluid fills."""
         return self.swept[:, 0]
 
+    def memory(self) -> int:
+        """Bytes of this rank's fields, the corners' as if they were as many as cells."""
+        fields = (
+            self.kind,
+            self.swept,
+            self._master,
+            self._kick,
+            self._debt,
+            *self.wall.fractions,
+            *self.wall.apertures,
+        )
+        return sum(field.nbytes for field in fields) + self._debt.nbytes
+
     def workload(self) -> np.ndarray:
         """(local blocks,) cells in the band around the wall."""
         return np.bincount(self._places()[0], minlength=self.blocks.local_count).astype(float)

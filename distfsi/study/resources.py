@@ -96,11 +96,19 @@ class Resources:
         value = np.dtype(self.scene.fluid.precision).itemsize
         in_memory = len(SSP_RK3) * variables * value
         if self.scene.solid:
-            in_memory += 1 + FLOAT * self.dimensions  # what covers a cell, and the impulse on it
+            in_memory += self._coupling_bytes(value)
         if self.scene.output.peaks:
             in_memory += 4 * FLOAT
         padded = math.prod(blocks.block_cells) * self.cell_file_bytes()
         return blocks.local_count * (math.prod(blocks.shape) * in_memory + padded)
+
+    def _coupling_bytes(self, value: int) -> int:
+        """Per cell, of values of so many bytes: what it is and the impulse on it; and what cuts it."""
+        D, paper = self.dimensions, 1 + FLOAT * self.dimensions
+        if self.scene.coupling.scheme == "paper":
+            return paper
+        swept = 3 if len(self.scene.fluid.phases) == 2 else 1
+        return paper + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
 
     # ---- files -------------------------------------------------------------------------------------------------------
 
