@@ -56,6 +56,7 @@ def parser() -> argparse.ArgumentParser:
     bench.add_argument("what", nargs="?", choices=("ranks",), help="ranks: messages, waiting and uneven shares instead")
     bench.add_argument("--threads", type=int, help="threads per rank")
     bench.add_argument("--only", metavar="PART", help="only benchmarks whose name holds PART")
+    commands.add_parser("doctor", help="tell what a run would find: MPI, GPUs, HDF5, threads, room on the disk")
     study = commands.add_parser("study", help="compare with reference answers")
     study.add_argument("name", nargs="+", help="which study: " + ", ".join(STUDIES))
     study.add_argument("--quick", action="store_true", help="a small size that only shows that the study works")
@@ -184,6 +185,13 @@ def study(arguments: argparse.Namespace) -> None:
         compare(communicator, arguments.set)
 
 
+def doctor(arguments: argparse.Namespace) -> None:
+    """Tell what a run would find."""
+    from distfsi.study import doctor
+
+    doctor.main(_start_ranks())
+
+
 COMMANDS = {
     "run": run,
     "check": check,
@@ -191,6 +199,7 @@ COMMANDS = {
     "plot": plot,
     "info": info,
     "bench": bench,
+    "doctor": doctor,
     "study": study,
 }
 

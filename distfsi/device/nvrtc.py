@@ -115,6 +115,7 @@ def instructions(code: bytes) -> dict[str, int]:
     if done.returncode:
         raise CompileError(done.stderr)
     names = re.findall(r"/\*[0-9a-f]{4,}\*/\s+(?:@!?U?P\w+\s+)?([A-Z][\w.]*)", done.stdout)
+    names = [name for name in names if name != "NOP"]  # fills the last line of code
     kinds = [next((k for k, first in INSTRUCTIONS.items() if name.startswith(first)), "others") for name in names]
     counted = Counter(kinds)
     return {kind: counted[kind] for kind in (*INSTRUCTIONS, "others")}

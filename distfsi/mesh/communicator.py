@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
 import sys
@@ -114,6 +115,13 @@ class Communicator:
                     finish()
         for failure in itertools.chain(*self.allgather(failures)):
             raise OSError(failure)
+
+    def takes_gpu_memory(self) -> bool | None:
+        """Whether the MPI library says that messages may lie in a GPU's memory; None when it does not tell."""
+        try:
+            return bool(ctypes.CDLL(MPI.__file__).MPIX_Query_cuda_support())
+        except (OSError, AttributeError):
+            return None
 
     def abort(self, code: int) -> None:
         """End all ranks at once; the launcher returns `code` where it can."""

@@ -45,6 +45,12 @@ def storage(name: str, communicator: Communicator) -> Storage:
     return {"mpi-io": MpiIo, "mpio": ParallelHdf5, "gather": Gather}[name](communicator)
 
 
+def parallel_hdf5() -> str:
+    """How this h5py writes from several ranks, in words."""
+    able = "has" if h5py.get_config().mpi else "has no"
+    return f"h5py {h5py.__version__} {able} parallel HDF5; all ranks write by MPI-IO either way"
+
+
 def write_complete(
     storage: Storage, communicator: Communicator, path: Path, lay_down: LayDown, pieces: Sequence[Piece]
 ) -> None:
