@@ -247,7 +247,7 @@ class TotalLagrangian:
         changed = [c[name] for name in ("deformation", "energy", "viscous_pressure")]
         self._run(near.own, "stretch", dt, *bonds, self._tensions, motion, *material, *changed, gradient, c["loose"])
         self._contact.heat(c["mass"], dt, motion, c["energy"])
-        if near.flags[0]:
+        if near.flags[0] and dt > 0.0:
             self._open_voids(c, dt, gradient)
 
     def _open_voids(self, c: dict[str, np.ndarray], dt: float, gradient: np.ndarray) -> None:

@@ -15,6 +15,8 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
 from distfsi.physics.tensors import determinant, inverse, product, rows, trace, transposed
 
+SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
+SHORTEST = 1e-300  # s: steps of no length strain nothing
 LEAST_GROWTH = 0.1  # of the volume in a step that can be taken
 
 
@@ -38,7 +40,7 @@ def whole_step(before, after, dt):
     shorter = 1.0 - tangent2 * (1.0 / 3.0 - 0.2 * tangent2)
     growth = log(determinant(after) / determinant(before))
     missing = (growth - trace(step)) * (2.0 / DIMENSIONS)
-    rate = 0.5 / dt
+    rate = 0.5 / max(dt, SHORTEST)
     return tuple(
         tuple(
             rate * (step[a][b] + step[b][a] + shorter * turn[a][b] + (missing if a == b else 0.0))
@@ -60,10 +62,13 @@ def bulk_viscosity(divergence, density, size, sound_speed):
 
 
 def zero_energy_stiffness(density, sound_speed, plastic_strain, shear_modulus, flow_stress):
-    """kappa [Pa] in shear moduli, secant moduli once the particle has flowed; 4/3 of them cancel the leading error that
-    the smoothing of F makes in shear waves. A material without shear keeps a twentieth of its longitudinal modulus."""
-    secant = 1.0 + 3.0 * shear_modulus * plastic_strain / max(flow_stress, 1e-300)
-    return ZERO_ENERGY * max(shear_modulus, 0.05 * density * sound_speed * sound_speed) / secant
+    """kappa [Pa] in shear moduli; 4/3 of them cancel the leading error that the smoothing of F makes in shear waves.
+
+    Once the particle has flowed, kappa falls faster than the secant modulus, so that it does not hold up the flow. A
+    material without shear has a twentieth of its longitudinal modulus instead of its shear modulus.
+    """
+    softer = 1.0 + SOFTENING * shear_modulus * plastic_strain / max(flow_stress, 1e-300)
+    return ZERO_ENERGY * max(shear_modulus, 0.05 * density * sound_speed * sound_speed) / softer
 
 
 def bond_stress(deviator, pressure, deformation, correction, stiffness):
