@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import (
     Ball,
     Box,
@@ -18,6 +19,9 @@ from distfsi.scene.description import (
     Scatter,
     Tube,
 )
+from distfsi.scene.loader import load
+from distfsi.simulation import Simulation
+from launch import ROOT
 from mpi_solid import COPPER_EOS, body, bursting_ball, digest, solid, step
 
 RUBBER_EOS, RUBBER = LinearEos(3.25e6), Elastic(0.7e6)
@@ -335,3 +339,18 @@ def test_a_restart_goes_on_to_the_same_bits():
             step(each)
     assert (part.columns["bond_count"] == 0).any()
     assert digest(part) == digest(again)
+
+
+@pytest.mark.full
+def test_verneys_shell_stops_at_its_radius():
+    """Plastic work alone stops an imploding cylinder of beryllium (a quarter of it) at an inner radius of 40 mm."""
+    simulation = Simulation.of(load(ROOT / "inputs/verney_shell.toml"), Communicator(), threads=1)
+    part = simulation.solid
+    before, least = energy(part), math.inf
+    while not simulation.done:
+        simulation.step()
+        ring = np.sort((part.columns["position"] ** 2).sum(axis=1))[: len(part.columns["id"]) // 10].mean()
+        least = min(least, ring)
+    inside = 0.081**2 - 0.08**2  # of the innermost of ten rings, whose area stays
+    assert math.sqrt(least - inside) == pytest.approx(0.04, rel=0.01)
+    assert energy(part) == pytest.approx(before, rel=1e-10)
