@@ -354,3 +354,20 @@ def test_verneys_shell_stops_at_its_radius():
     inside = 0.081**2 - 0.08**2  # of the innermost of ten rings, whose area stays
     assert math.sqrt(least - inside) == pytest.approx(0.04, rel=0.01)
     assert energy(part) == pytest.approx(before, rel=1e-10)
+
+
+def test_a_bar_bounces_from_its_mirror_image():
+    """It does not touch the symmetry plane at the start, so that it is not bonded to its image behind it."""
+    bar = body(Box((0.3, 0.0), (0.7, 0.2)), 0.05, 1000.0, (-5.0, 0.0), RUBBER_EOS, RUBBER)
+    part = total_lagrangian([bar], (0.0, -1.0), (2.0, 1.0), (0,))
+    before, closest = energy(part), math.inf
+    for _ in range(300):
+        step(part)
+        closest = min(closest, part.columns["position"][:, 0].min())
+    totals = part.totals()
+    assert 0.8 * 0.025 < closest < 0.025
+    assert totals["momentum"][0] > 0.7 * totals["mass"] * 5.0
+    change = totals["momentum"] - np.array([-5.0, 0.0]) * totals["mass"]
+    assert np.allclose(change, part.boundary_impulse(), rtol=0.0, atol=1e-12 * totals["mass"] * 5.0)
+    assert energy(part) == pytest.approx(before, rel=1e-12)
+    assert len(part.pieces()["piece"]) == 1

@@ -116,8 +116,8 @@ class TotalLagrangian:
         self._search.find(plan.own, position, state, plan.key, support)
         first, place = np.nonzero(np.arange(self._search.table.shape[1]) < self._search.count[:, None])
         second = self._search.table[first, place]
-        image = plan.key[second] % IMAGES
-        bonded = (body[first] == body[second]) & (image & ~self._through_planes(c, exchange)[body[first]] == 0)
+        self._through = self._through_planes(c, exchange)
+        bonded = self._side(body, plan.key)[second] == body[first]
         first, key = first[bonded], plan.key[second[bonded]]
         order = np.lexsort((key, first))
         return first[order], key[order]
@@ -130,6 +130,10 @@ class TotalLagrangian:
             touching[c["body"][close], axis] = 1.0
         touching = self._communicator.maximum(touching.ravel()).reshape(touching.shape)
         return (touching.astype(np.int64) << np.arange(self._dimensions)).sum(axis=1)
+
+    def _side(self, body: np.ndarray, key: np.ndarray) -> np.ndarray:
+        """(n,) numbers of the bodies of particles and images; an image at a plane where its body ends is another's."""
+        return body + len(self._through) * (key % IMAGES & ~self._through[body] > 0)
 
     def _place(self, c: dict[str, np.ndarray], key: np.ndarray, reference: np.ndarray, volume: np.ndarray) -> None:
         """Find the partners' rows, the vectors and the weights of the bonds, if the rows have changed since."""
@@ -210,7 +214,9 @@ class TotalLagrangian:
             self._debris.push_debris(c, near, np.flatnonzero(facts[:, DEBRIS]), acceleration, limits)
         bonds = (c["bond_count"], self._partner, self._bond)
         self._run(near.own, "pull", *bonds, self._tensions, c["volume"], c["mass"], acceleration)
-        self._contact.find(near, reference, facts[:, [BODY, EXPOSED, DEBRIS]].astype(np.int64), c["bonds"])
+        marks = facts[:, [BODY, EXPOSED, DEBRIS]].astype(np.int64)
+        marks[:, 0] = self._side(marks[:, 0], near.plan.key)
+        self._contact.find(near, reference, marks, c["bonds"])
         self._contact.accelerate(c["mass"], acceleration)
         material = [c[name] for name in ("body", "sound_speed", "viscous_pressure", "density", "deformation")]
         self._run(near.own, "bound", c["bond_count"], self._size, *material, acceleration, limits)
