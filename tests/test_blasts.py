@@ -49,11 +49,14 @@ def sedov(dimensions, cells):
         (1, 200, 0.005, 5.0),
         (2, 80, 0.0075, 4.0),
         pytest.param(2, 120, 0.005, 4.5, marks=full),
-        pytest.param(3, 64, 0.005, 4.0, marks=full),
+        pytest.param(3, 64, 0.01, 4.0, marks=full),
     ],
 )
 def test_sedov(dimensions, cells, radius, density):
-    """The shock's radius, the pressure inside within 5 %, the density's peak of 6."""
+    """The shock's radius, the pressure inside within 5 %, the density's peak of 6.
+
+    The radius is off by half a cell on all meshes: 0.5 % takes 100 cells to the shock, in three dimensions, too.
+    """
     shock, pressure, peak = sedov(dimensions, cells)
     assert shock == pytest.approx(1.0, abs=radius)
     assert pressure == pytest.approx(1.0, abs=0.05)

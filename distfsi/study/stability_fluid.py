@@ -30,7 +30,7 @@ from distfsi.study.problems import INPUTS, centers, fields, start
 from distfsi.study.references import AIR, WATER
 
 DIRECTORY = Path("out/study_stability_fluid")
-CELLS = 100
+CELLS = 50
 WAY = 0.4  # that the fastest wave goes, in lengths of the tube
 MOST_STEPS = 20.0  # times those that the fastest wave should need
 SWINGS = 1.5  # total variation of the velocity over the exact one
