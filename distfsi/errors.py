@@ -23,6 +23,10 @@ class Diverged(DistfsiError):
     exit_code = 3
 
 
+class StepFailed(Diverged):
+    """No attempt at a step has left a valid state; the state before the step is still there."""
+
+
 class OutputError(DistfsiError):
     """Results could not be written; the message names the file, the cause and the space left. Raised on every rank."""
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
-from distfsi.physics import euler, limiters, riemann, two_phase
+from distfsi.physics import euler, limiters, positivity, riemann, two_phase
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
@@ -119,8 +119,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
     model = MODELS[phases]
-    names = ("primitives", "conserved", "face_flux", "updated", "sound_speed")
+    names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
+    bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
     bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True

@@ -18,7 +18,7 @@ from distfsi.device.cpu import Team
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.nvrtc import CompileError
 from distfsi.device.seam import Device
-from distfsi.errors import Diverged, InputError, Stopped
+from distfsi.errors import Diverged, InputError, StepFailed, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
@@ -44,15 +44,26 @@ COUPLINGS = {"cut_cells": CutCells, "paper": Coupling}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 STEPS_BETWEEN_DEALS = 100
 
+ATTEMPTS = 8  # at a step, each with half the time step of the one before
+
+NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
+
 TimeStep = Callable[[], float]
 
 
 def fluid_step(fluid: Fluid, time_step: TimeStep) -> float:
-    """Advance the fluid by one step and return it [s]."""
+    """Advance the fluid by one step and return it [s]; one that leaves no valid state is redone with half of it."""
     dt = time_step()
-    for stage in fluid.stages:  # paper, Eq. 16
-        fluid.advance_stage(stage, dt)  # MUSCL, HLLC, update and relaxation: Eqs. 11-30
-    return dt
+    for attempt in range(ATTEMPTS):
+        if attempt:
+            fluid.reject()
+            dt *= 0.5
+        fluid.begin_step()
+        for stage in fluid.stages:  # paper, Eq. 16
+            fluid.advance_stage(stage, dt)  # MUSCL, HLLC, update and relaxation: Eqs. 11-30
+        if fluid.is_valid():
+            return dt
+    raise StepFailed(f"{ATTEMPTS} attempts failed, the last with a step of {dt:.3g} s")
 
 
 def solid_step(solid: Solid, time_step: TimeStep) -> float:
@@ -139,14 +150,25 @@ class Simulation:
         """Advance everything by one step."""
         parts = self.parts
         step = coupled_step if self.coupling else fluid_step if self.fluid else solid_step
+        rejected = self.rejected_steps
         try:
             self.dt = step(*parts, self.time_step)
         except Diverged as error:
             faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
-            raise Diverged(faults[0]) from error
+            if isinstance(error, StepFailed):
+                self.fluid.reject()
+                raise Diverged(f"{faults[0]}; {error}") from error
+            raise Diverged(faults[0] + (NOT_REDONE if self.coupling else "")) from error
+        if self.rejected_steps > rejected:
+            self.limited_by = "rejected step"
         self.time += self.dt
         self.steps += 1
         self.watch()
+
+    @property
+    def rejected_steps(self) -> int:
+        """How many steps have been redone with a smaller time step."""
+        return self.fluid.rejected_steps if self.fluid else 0
 
     def watch(self) -> None:
         """Show the state to the watchers: once before the first step, then after each."""
@@ -181,6 +203,10 @@ class Simulation:
         faults = self._faults(self.coupling.covered if self.coupling else None)
         if faults:
             raise Diverged(faults[0])
+
+    def is_valid(self) -> bool:
+        """Collective. Whether the next step can start from the present state."""
+        return not self._faults(self.coupling.covered if self.coupling else None)
 
     def _faults(self, covered: np.ndarray | None = None) -> list[str]:
         """Collective. What the ranks tell of invalid states; cells that are `covered` may hold anything."""
@@ -337,6 +363,8 @@ def advance(
                 simulation.check()
         except Diverged as error:
             records.write_fields()
+            if simulation.is_valid():
+                records.write_restart({name: part.snapshot() for name, part in kept.items()})
             raise Diverged(f"{error}\n{records.left_behind()}") from error
         records.write(always=simulation.done)
         progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)

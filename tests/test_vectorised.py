@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROWS = (fluid.primitives_row, fluid.slopes_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
-REALS = ("cx", "cy", "cz", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
+REALS = ("cx", "cy", "cz", "rate", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),

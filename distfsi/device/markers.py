@@ -57,6 +57,9 @@ def store(A, i, x):
     A.flat[i] = x
 
 
+real = float  # in a kernel: the scene's precision
+
+
 def workspace(n):
     """n uninitialised reals that live as long as the driver call."""
     return np.empty(n)

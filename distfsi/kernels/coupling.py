@@ -7,8 +7,8 @@ A cell is named by its flat index `at` in a field of one variable: block * (cell
 
 from math import floor
 
-from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
+from distfsi.device.markers import driver, helper, load, real, store, workspace
+from distfsi.kernels.fluid import face_fluxes, place, primitives_row, slopes_row
 from distfsi.kernels.gather import any_particle, sum_particles
 from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
@@ -206,9 +206,9 @@ def fill_deep(begin, end, deep, U, shape, rest):
 
 
 @helper
-def add_flux(passed, n, U, at, cells, steps, axis, weight, P, T, F):
+def add_flux(passed, n, U, at, cells, steps, rates, axis, weight, P, T, F):
     """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`, by the rows of the
-    stage.
+    stage. rates (D,): dt/h per axis.
 
     P holds five lines of four cells: the one through the face, and those beside it if the flux looks there.
     """
@@ -222,40 +222,40 @@ def add_flux(passed, n, U, at, cells, steps, axis, weight, P, T, F):
                 primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
                 primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
     slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
-    flux_row(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, 1)
+    face_fluxes(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, real(2 * DIMENSIONS) * rates[axis], 1, 1)
     for v in range(PHASES + DIMENSIONS + 1):
         passed[n, v] += weight * load(F, 2 * place(v, axis))
 
 
 @driver
-def collect_wall(begin, end, covered, passed, U, kind, shape, steps, weights):
+def collect_wall(begin, end, covered, passed, U, kind, shape, steps, rates, weights):
     """passed[n] (conserved) grows by what crosses the faces between covered cells and fluid ones.
 
-    weights (D,): share of the stage * dt * area of a face.
+    rates (D,): dt/h per axis; weights (D,): share of the stage * dt * area of a face.
     """
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
     for n in range(begin, end):
         at = covered[n]
         for axis in range(DIMENSIONS):
             step = steps[axis]
             if kind[at - step] < COVERED:
-                add_flux(passed, n, U, at - step, cells, steps, axis, weights[axis], P, T, F)
+                add_flux(passed, n, U, at - step, cells, steps, rates, axis, weights[axis], P, T, F)
             if kind[at + step] < COVERED:
-                add_flux(passed, n, U, at, cells, steps, axis, -weights[axis], P, T, F)
+                add_flux(passed, n, U, at, cells, steps, rates, axis, -weights[axis], P, T, F)
 
 
 @driver
-def collect_sides(begin, end, side_cells, side, passed, U, kind, shape, steps, weights):
+def collect_sides(begin, end, side_cells, side, passed, U, kind, shape, steps, rates, weights):
     """passed[n] grows by what leaves through a domain's side, side[n] = 2 axis + (0 low, 1 high), at a covered cell."""
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
     for n in range(begin, end):
         at, axis = side_cells[n], side[n] // 2
         if kind[at] >= COVERED:
             high = side[n] % 2
             before = at if high == 1 else at - steps[axis]
-            add_flux(passed, n, U, before, cells, steps, axis, (2 * high - 1) * weights[axis], P, T, F)
+            add_flux(passed, n, U, before, cells, steps, rates, axis, (2 * high - 1) * weights[axis], P, T, F)
 
 
 @driver

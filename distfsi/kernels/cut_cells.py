@@ -5,10 +5,10 @@ is whole, so that both are the same. `swept` (blocks, SWEPT, Z, Y, X) holds v an
 phase energies. Cells are named as in kernels/coupling.py.
 """
 
-from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.device.markers import driver, helper, load, real, store, workspace
 from distfsi.kernels.coupling import BOX, FLUID, LINE, add_flux
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening
-from distfsi.kernels.fluid import flux_row, place, primitives_row, slopes_row
+from distfsi.kernels.fluid import face_fluxes, place, primitives_row, slopes_row
 from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
@@ -183,8 +183,8 @@ def open_between(kind, old, new, at, axis, step, cells):
 
 
 @helper
-def flux_beside_wall(U, kind, old, new, at, cells, steps, axis, P, T, F):
-    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage.
+def flux_beside_wall(U, kind, old, new, at, cells, steps, rates, axis, P, T, F):
+    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage; rates (D,): dt/h.
 
     P holds five lines of four cells: the one through the face, and those beside it if the flux looks there. The slope
     of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
@@ -205,7 +205,7 @@ def flux_beside_wall(U, kind, old, new, at, cells, steps, axis, P, T, F):
         if not (between > 0.0 and beyond > 0.0):
             for v in range(VARIABLES):
                 T[2 * v + c] = 0.0
-    flux_row(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, 1)
+    face_fluxes(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, real(2 * DIMENSIONS) * rates[axis], 1, 1)
     return between
 
 
@@ -233,7 +233,7 @@ def advance_band(
     work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
     """
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F, D = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES), workspace(FLUXES)
+    P, T, F, D = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2), workspace(FLUXES)
     for n in range(begin, end):
         at = band[n]
         for v in range(FLUXES):
@@ -243,7 +243,7 @@ def advance_band(
             for side in range(2):
                 here = at + (side - 1) * step
                 if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
-                    between = flux_beside_wall(U, kind, old, new, here, cells, steps, axis, P, T, F)
+                    between = flux_beside_wall(U, kind, old, new, here, cells, steps, rates, axis, P, T, F)
                     rate = (2 * side - 1) * rates[axis] * between
                     for v in range(FLUXES):
                         D[v] += rate * load(F, 2 * place(v, axis))
@@ -271,22 +271,24 @@ def advance_band(
 
 @driver
 def book_sides(
-    begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, weights
+    begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, rates, weights
 ):  # fmt: skip
     """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
-    1 high), beyond what leaves there, for the cells `chosen`. weights (D,): share of the stage * dt * area of a face.
+    1 high), beyond what leaves there, for the cells `chosen`.
+
+    rates (D,): dt/h per axis; weights (D,): share of the stage * dt * area of a face.
     """
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES)
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
     for m in range(begin, end):
         n = chosen[m]
         axis, high = side[n] // 2, side[n] % 2
         step = steps[axis]
         before = side_cells[n] if high == 1 else side_cells[n] - step
         weight = (2 * high - 1) * weights[axis]
-        add_flux(passed, n, U, before, cells, steps, axis, weight, P, T, F)
+        add_flux(passed, n, U, before, cells, steps, rates, axis, weight, P, T, F)
         if open_between(kind, old, new, before + step, axis, step, cells) > 0.0:
-            between = flux_beside_wall(U, kind, old, new, before, cells, steps, axis, P, T, F)
+            between = flux_beside_wall(U, kind, old, new, before, cells, steps, rates, axis, P, T, F)
             for v in range(PHASES + DIMENSIONS + 1):
                 passed[n, v] -= weight * between * load(F, 2 * place(v, axis))
 

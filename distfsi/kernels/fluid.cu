@@ -74,22 +74,32 @@ template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int
     return jump;
 }
 
-// Flux through the face between a cell and the next along AXIS; its velocity components are rotated.
-template <int AXIS> DEVICE void flux(const real *P, int i, int j, int k, real *F, int step)
+// Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
+// cell * dt/h. Whether it was limited.
+template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real rate, real *F, int step)
 {
-    real left[VARIABLES], right[VARIABLES];
+    real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
     const int before = cell_along<AXIS>(i, j, k, -1), low = cell(i, j, k);
     const int high = cell_along<AXIS>(i, j, k, 1), after = cell_along<AXIS>(i, j, k, 2);
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
         const real *W = P + rotated(v, AXIS) * SP;
         const real difference = W[high] - W[low];
+        low_mean[v] = W[low], high_mean[v] = W[high];
         left[v] = W[low] + HALF * limited_slope(W[low] - W[before], difference);
         right[v] = W[high] - HALF * limited_slope(difference, W[after] - W[high]);
     }
     real jump = 0;
     if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
-    put(face_flux(tuple_of<VARIABLES>(left), tuple_of<VARIABLES>(right), jump), F, step);
+    const auto L = tuple_of<VARIABLES>(left), R = tuple_of<VARIABLES>(right);
+    put(face_flux(L, R, jump), F, step);
+    for (int v = 0; v < FLUXES; v++) value[v] = F[v * step];
+    const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
+    const auto f = tuple_of<FLUXES>(value);
+    if (!(reserve(l, r, f, minimum(sound_speed(L), sound_speed(R)), rate) < 0) || is_admissible(l, r, f, rate))
+        return false;
+    put(limited_flux(l, r, f, jump, rate), F, step);
+    return true;
 }
 
 // P = primitives of plane k of the cells at U, with n x m cells and their ghosts.
@@ -160,11 +170,13 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const bool inside = tx < n && ty < m;
     double *out = through + t * 6 * CONSERVED;
     real low[FLUXES], high[FLUXES], D[FLUXES];
+    const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * cx, ry = sides_of_cell * cy, rz = sides_of_cell * cz;
+    long long count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
     for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
-        if (inside) flux<2>(P, tx, ty, -1, low, 1);
+        if (inside) count += flux<2>(P, tx, ty, -1, rz, low, 1);
         if (sides & 16) {
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v];
@@ -176,7 +188,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     for (int k = 0; k < l; k++) {
         if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + 2, n, m, tx, ty, sy, sz, su);
         if (ty < m)
-            for (int i = tx; i < n + 1; i += TILE_X) flux<0>(P, i - 1, ty, k, F + ty * ROW + i, FACES);
+            for (int i = tx; i < n + 1; i += TILE_X)
+                count += flux<0>(P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
         __syncthreads();
         if (inside) {
 #pragma unroll
@@ -192,7 +205,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         if constexpr (DIMENSIONS > 1) {
             __syncthreads();
             if (tx < n)
-                for (int j = ty; j < m + 1; j += TILE_Y) flux<1>(P, tx, j - 1, k, F + j * ROW + tx, FACES);
+                for (int j = ty; j < m + 1; j += TILE_Y)
+                    count += flux<1>(P, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
             __syncthreads();
             if (inside) {
 #pragma unroll
@@ -206,7 +220,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         }
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                flux<2>(P, tx, ty, k, high, 1);
+                count += flux<2>(P, tx, ty, k, rz, high, 1) && k < l - 1;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) D[v] = D[v] + (high[place(v, 2)] - low[place(v, 2)]) * cz;
 #pragma unroll
@@ -239,7 +253,12 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             for (int j = ty; j < ny; j += TILE_Y)
                 for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
     }
-    if (threadIdx.x == 0) stages[t] = unchanged ? stages[t] + 1 : 0;
+    long long *counts = (long long *)shared;
+    counts[threadIdx.x] = count;
+    __syncthreads();
+    if (threadIdx.x > 0) return;
+    for (int thread = 0; thread < THREADS; thread++) limited[t] += counts[thread];
+    stages[t] = unchanged ? stages[t] + 1 : 0;
 }
 
 #else
@@ -266,6 +285,9 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(
         put(W, w, 1);
         real signal = (magnitude(w[PHASES]) + c) * rates[0];
         for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
+        real lightest = state[0];
+        for (int phase = 1; phase < PHASES; phase++) lightest = minimum(lightest, state[phase]);
+        signal = signal + (square_root(lightest) - square_root(lightest));
         most = maximum(most, signal);
         invalid = invalid + (signal - signal);
     }

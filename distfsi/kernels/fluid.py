@@ -12,7 +12,9 @@ P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes h
 have their velocity components rotated so that the normal one comes first.
 """
 
-from distfsi.device.markers import ByHand, driver, helper, load, row, store, workspace
+from math import sqrt
+
+from distfsi.device.markers import ByHand, driver, helper, load, real, row, store, workspace
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
@@ -21,8 +23,11 @@ from distfsi.physics.symbols import (
     PHASES,
     VARIABLES,
     face_flux,
+    is_admissible,
+    limited_flux,
     limited_slope,
     primitives,
+    reserve,
     sound_speed,
     updated,
 )
@@ -82,26 +87,72 @@ def jump_along_face(P, c, step, side_1, side_2):
     return jump
 
 
-@row
-def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, n):
-    """F[f …] = flux through the faces between the n cells at P[p …] and those `step` further along `axis`.
+@helper
+def cell_mean(P, c, sp, axis):
+    """Primitive state of the cell P[c], the velocity along `axis` first."""
+    return tuple(load(P, c + rotated(v, axis) * sp) for v in static_range(VARIABLES))
 
-    Along the other axes neighbours are side_1 and side_2 apart.
+
+@helper
+def jump_of_face(P, c, sp, step, side_1, side_2):
+    """What `face_flux` needs of the pressures around the face between the cells c and c + step."""
+    return jump_along_face(P, c + (PHASES + DIMENSIONS) * sp, step, side_1, side_2) if LOOKS_SIDEWAYS else 0.0
+
+
+@row
+def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, rate, n):
+    """F[f …] = flux through the faces between the n cells at P[p …] and those `step` further along `axis`, and behind
+    it the reserve that tells whether the limiter should look at it; returns how many it should.
+
+    Along the other axes neighbours are side_1 and side_2 apart. rate: faces of a cell * dt/h.
     """
+    count = 0
     for i in range(n):
-        left = tuple(
-            load(P, p + rotated(v, axis) * sp + i) + load(T, t_low + rotated(v, axis) * st + i)
-            for v in static_range(VARIABLES)
-        )
-        right = tuple(
-            load(P, p + step + rotated(v, axis) * sp + i) - load(T, t_high + rotated(v, axis) * st + i)
-            for v in static_range(VARIABLES)
-        )
-        pressures = p + (PHASES + DIMENSIONS) * sp + i
-        jump = jump_along_face(P, pressures, step, side_1, side_2) if LOOKS_SIDEWAYS else 0.0
-        flux = face_flux(left, right, jump)
+        low, high = cell_mean(P, p + i, sp, axis), cell_mean(P, p + step + i, sp, axis)
+        left = tuple(low[v] + load(T, t_low + rotated(v, axis) * st + i) for v in static_range(VARIABLES))
+        right = tuple(high[v] - load(T, t_high + rotated(v, axis) * st + i) for v in static_range(VARIABLES))
+        flux = face_flux(left, right, jump_of_face(P, p + i, sp, step, side_1, side_2))
         for v in static_range(FLUXES):
             store(F, f + v * st + i, flux[v])
+        c = min(sound_speed(left), sound_speed(right))
+        left_over = reserve(low, high, flux, c, rate)
+        store(F, f + FLUXES * st + i, left_over)
+        count += 1 if left_over < 0.0 else 0
+    return count
+
+
+@helper
+def next_without_reserve(F, reserves, i, n):
+    """The first face from i on that has no reserve; n if there is none."""
+    while i < n and load(F, reserves + i) >= 0.0:
+        i += 1
+    return i
+
+
+@row
+def limit_faces(P, F, p, sp, step, side_1, side_2, st, f, axis, rate, n, counted):
+    """Limit those of the n fluxes F[f …] of `flux_row` that have no reserve; returns how many of the first `counted`
+    were changed."""
+    count = 0
+    i = next_without_reserve(F, f + FLUXES * st, 0, n)
+    while i < n:
+        low, high = cell_mean(P, p + i, sp, axis), cell_mean(P, p + step + i, sp, axis)
+        flux = tuple(load(F, f + v * st + i) for v in static_range(FLUXES))
+        if not is_admissible(low, high, flux, rate):
+            limited = limited_flux(low, high, flux, jump_of_face(P, p + i, sp, step, side_1, side_2), rate)
+            for v in static_range(FLUXES):
+                store(F, f + v * st + i, limited[v])
+            count += 1 if i < counted else 0
+        i = next_without_reserve(F, f + FLUXES * st, i + 1, n)
+    return count
+
+
+@helper
+def face_fluxes(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, rate, n, counted):
+    """`flux_row` and, if needed, `limit_faces`; returns how many of the first `counted` faces were limited."""
+    if flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, rate, n) > 0:
+        return limit_faces(P, F, p, sp, step, side_1, side_2, st, f, axis, rate, n, counted)
+    return 0
 
 
 @helper
@@ -187,6 +238,11 @@ def book(through, t, side, F, f, step, st, axis, n, rows, weight):
             through[t, side, v] += total * weight
 
 
+STAGE_FORMULAS = (
+    "primitives", "limited_slope", "face_flux", "sound_speed", "reserve", "is_admissible", "limited_flux", "updated",
+)  # fmt: skip
+
+
 def stage_block(constants, arguments):
     """A thread per column of a tile; shared memory holds primitives of the tile, in 3D of four planes, and fluxes."""
     D = constants["DIMENSIONS"]
@@ -197,17 +253,18 @@ def stage_block(constants, arguments):
     return {"TILE_X": x, "TILE_Y": y, "THREADS": x * y, "SHARED": shared}
 
 
-@ByHand("fluid.cu", ("primitives", "limited_slope", "face_flux", "updated"), stage_block)
+@ByHand("fluid.cu", STAGE_FORMULAS, stage_block)
 @driver
 def advance_tiles(
-    begin, end, chosen, tiles, calm, stages, U_n, U, U_new, through, b, dt, weight, cx, cy, cz, px, py, pz
+    begin, end, chosen, tiles, calm, stages, U_n, U, U_new, through, limited, b, dt, weight, cx, cy, cz, px, py, pz
 ):  # fmt: skip
     """One Runge-Kutta stage of the tiles chosen[begin:end].
 
     calm (tiles,): which tiles are known to stay as they are, in U_new too; only their flux is booked.
     stages (tiles + 1,): for how many stages each tile has not changed; counted here.
     U_n, U, U_new: (blocks, VARIABLES, Z, Y, X), the state before the step, of this stage and after it; U_n may be U.
-    through (tiles, 6, conserved): grows by weight * dt/h * flux at the domain's sides. cx, cy, cz: dt/h per axis.
+    through (tiles, 6, conserved): grows by weight * dt/h * flux at the domain's sides. limited (tiles,): grows by the
+    faces at the low sides of the tile's cells whose flux was limited. cx, cy, cz: dt/h per axis.
     """
     sy = U.shape[4]
     sz = sy * U.shape[3]
@@ -215,7 +272,9 @@ def advance_tiles(
     sp = px * py * pz
     gy = 2 if DIMENSIONS > 1 else 0
     gz = 2 if DIMENSIONS > 2 else 0
-    slopes, fluxes = VARIABLES * px, FLUXES * px
+    slopes, fluxes = VARIABLES * px, (FLUXES + 1) * px
+    faces = real(2 * DIMENSIONS)
+    rx, ry, rz = faces * cx, faces * cy, faces * cz
     P = workspace(VARIABLES * sp)
     T = workspace((3 + 2 * py) * slopes)
     F = workspace((3 + 2 * py) * fluxes)
@@ -234,6 +293,7 @@ def advance_tiles(
                 beside = LOOKS_SIDEWAYS and j >= -1 and j <= m and k >= -1 and k <= l
                 if (j >= 0 and j < m) or (k >= 0 and k < l) or beside:
                     primitives_row(U, P, u0 + k * sz + j * sy - 2, su, ((k + gz) * py + j + gy) * px, sp, n + 4)
+        count = 0
         tx, fx = 0, 0
         ty, ty_next = slopes, 2 * slopes
         fy, fy_next = fluxes, 2 * fluxes
@@ -243,7 +303,7 @@ def advance_tiles(
                 tz, tz_next, fz = (3 + j) * slopes, (3 + py + j) * slopes, (3 + j) * fluxes
                 slopes_row(P, T, c - px * py, sp, px * py, tz_next, px, n)
                 slopes_row(P, T, c, sp, px * py, tz, px, n)
-                flux_row(P, T, F, c - px * py, sp, px * py, 1, px, tz_next, tz, px, fz, 2, n)
+                count += face_fluxes(P, T, F, c - px * py, sp, px * py, 1, px, tz_next, tz, px, fz, 2, rz, n, n)
                 if sides & 16:
                     book(through, t, 4, F, fz, step, px, 2, nx, z_alike, weight * cz)
         for k in range(l):
@@ -252,20 +312,22 @@ def advance_tiles(
                 c = ((k + gz) * py + gy) * px + 2
                 slopes_row(P, T, c - px, sp, px, ty_next, px, n)
                 slopes_row(P, T, c, sp, px, ty, px, n)
-                flux_row(P, T, F, c - px, sp, px, 1, px * py, ty_next, ty, px, fy, 1, n)
+                count += face_fluxes(P, T, F, c - px, sp, px, 1, px * py, ty_next, ty, px, fy, 1, ry, n, n)
                 if sides & 4:
                     book(through, t, 2, F, fy, step, px, 1, nx, y_alike, weight * cy)
             for j in range(m):
                 c = ((k + gz) * py + j + gy) * px + 2
                 slopes_row(P, T, c - 1, sp, 1, tx, px, n + 2)
-                flux_row(P, T, F, c - 1, sp, 1, px, px * py, tx, tx + 1, px, fx, 0, n + 1)
+                count += face_fluxes(P, T, F, c - 1, sp, 1, px, px * py, tx, tx + 1, px, fx, 0, rx, n + 1, n)
                 if DIMENSIONS > 1:
                     slopes_row(P, T, c + px, sp, px, ty_next, px, n)
-                    flux_row(P, T, F, c, sp, px, 1, px * py, ty, ty_next, px, fy_next, 1, n)
+                    own = n if j < m - 1 else 0
+                    count += face_fluxes(P, T, F, c, sp, px, 1, px * py, ty, ty_next, px, fy_next, 1, ry, n, own)
                 if DIMENSIONS > 2:
                     tz, tz_next, fz = (now + j) * slopes, (then + j) * slopes, (then + j) * fluxes
                     slopes_row(P, T, c + px * py, sp, px * py, tz_next, px, n)
-                    flux_row(P, T, F, c, sp, px * py, 1, px, tz, tz_next, px, fz, 2, n)
+                    own = n if k < l - 1 else 0
+                    count += face_fluxes(P, T, F, c, sp, px * py, 1, px, tz, tz_next, px, fz, 2, rz, n, own)
                 u = u0 + k * sz + j * sy
                 fz_low, fz_high = (now + j) * fluxes, (then + j) * fluxes
                 update_row(
@@ -285,13 +347,14 @@ def advance_tiles(
             for k in range(nz):
                 for j in range(ny):
                     repeat_row(U_new, u0 + k * sz + j * sy, u0, su, nx)
+        limited[t] += count
         stages[t] = stages[t] + 1 if uniform and is_unchanged(U_n, U, U_new, u0, su) else 0
 
 
 @row
 def signal_row(U, S, u, su, n, rx, ry, rz):
     """S[i] = sum over axes of (|u| + c)/h, largest so far in column i; S[n + i] stays 0 as long as every signal is
-    finite."""
+    finite; that of a cell with a negative mass is not."""
     for i in range(n):
         W = primitives(tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)))
         c = sound_speed(W)
@@ -300,6 +363,10 @@ def signal_row(U, S, u, su, n, rx, ry, rz):
             signal = signal + (abs(W[PHASES + 1]) + c) * ry
         if DIMENSIONS > 2:
             signal = signal + (abs(W[PHASES + 2]) + c) * rz
+        lightest = load(U, u + i)
+        for k in static_range(1, PHASES):
+            lightest = min(lightest, load(U, u + k * su + i))
+        signal = signal + (sqrt(lightest) - sqrt(lightest))
         store(S, i, max(load(S, i), signal))
         store(S, n + i, load(S, n + i) + (signal - signal))
 
@@ -313,7 +380,7 @@ def signal_block(constants, arguments):
 @driver
 def fastest_signals(begin, end, chosen, U, start, extent, rx, ry, rz, fastest):
     """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s] for the blocks chosen[begin:end]; NaN when a
-    cell is not finite.
+    cell has no valid state.
 
     start: index of a block's first active cell within one variable; rx, ry, rz: 1/h.
     """
@@ -329,8 +396,7 @@ def fastest_signals(begin, end, chosen, U, start, extent, rx, ry, rz, fastest):
         for k in range(extent[block, 2]):
             for j in range(extent[block, 1]):
                 signal_row(U, S, block * VARIABLES * su + start + k * sz + j * sy, su, n, rx, ry, rz)
-        largest = S[0] + S[n]
+        largest, invalid = S[0], S[n]
         for i in range(1, n):
-            signal = S[i] + S[n + i]
-            largest = largest if signal <= largest else signal
-        fastest[block] = largest
+            largest, invalid = max(largest, S[i]), invalid + S[n + i]
+        fastest[block] = largest + invalid

@@ -29,7 +29,7 @@ class Accounts:
         self._scale = np.zeros(len(self.conserved))
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
-            self.columns += [f"fluid {name}" for name in self.conserved]
+            self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
         self.columns += [f"left {name}" for name in self.conserved]
         if solid:
             self.columns += [
@@ -63,6 +63,7 @@ class Accounts:
         if self.fluid:
             totals, magnitude = self.fluid.totals(self.coupling.volume if self.coupling else None)
             book("fluid", totals, magnitude=magnitude)
+            values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
         if self.solid:
             totals = self.solid.totals()

@@ -165,7 +165,8 @@ class Coupling:
         """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage (Eqs. 33,
         35)."""
         weights = stage.weight * dt * self._cell_volume / self._spacing
-        rest = (self._input, self._kinds, self._shape, self._steps, weights)
+        rates = np.array(self.fluid.rates(dt)[: self._dimensions])
+        rest = (self._input, self._kinds, self._shape, self._steps, rates, weights)
         run, k = self.team.run, self.fluid_kernels
         run(k.collect_wall, len(self._covered), self._covered, self._passed, *rest)
         run(k.collect_sides, len(self._side), self._side_cells, self._side, self._through_sides, *rest)

@@ -148,7 +148,7 @@ class CutCells:
 
     def after_stage(self, stage: Stage, dt: float) -> None:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
-        rates, weight = dt / self._spacing, stage.weight * dt
+        rates, weight = np.array(self.fluid.rates(dt)[: self._dimensions]), stage.weight * dt
         self._run(
             self.fluid_kernels.advance_band, self._start, self._input, self._output, self.swept.reshape(-1),
             self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
@@ -157,7 +157,7 @@ class CutCells:
         near = np.flatnonzero(self.wall.near[self._side_blocks])
         self.team.run(
             self.fluid_kernels.book_sides, len(near), near, self._side_cells, self._side, self._through_sides,
-            self._input, *self._walls, weight * self._cell_volume / self._spacing,
+            self._input, *self._walls, rates, weight * self._cell_volume / self._spacing,
         )  # fmt: skip
         if stage is self.fluid.stages[-1]:
             self._settle()

@@ -62,6 +62,9 @@ class Fluid:
         self._lay_tiles(team.tile_cells(scene.performance.tile_cells))
         self._extent = team.array(blocks.extent)
         self._fastest = Pair(team, np.zeros(blocks.local_count))
+        self._before = self._booked()
+        self._signal: float | None = None
+        self.rejected_steps = 0
 
     def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
@@ -92,6 +95,7 @@ class Fluid:
         self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
         self._table = self.team.array(self.tiles)
         self._through = Pair(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
+        self._limited = Pair(self.team, np.zeros(len(self.tiles), dtype=np.int64))
         self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
 
     def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
@@ -122,6 +126,30 @@ class Fluid:
         """Where a stage leaves its state; asked before the stage."""
         return self._buffers[_output(stage.number)].there
 
+    def begin_step(self) -> None:
+        """Remember what `reject` must bring back besides the state."""
+        self._before = self._booked()
+        self._signal = None
+
+    def reject(self) -> None:
+        """Go back to the state before the last step."""
+        self._buffers[:2] = self._buffers[1::-1]
+        for pair, before in zip((self._through, self._limited), self._before, strict=True):
+            pair.here()[:] = before
+            pair.changed()
+        self.rejected_steps += 1
+        self._signal = None
+        self.rest.wake()
+
+    def is_valid(self) -> bool:
+        """Collective. Whether all cells of all ranks have a valid state."""
+        self._signal = self.fastest_signal()
+        return bool(np.isfinite(self.blocks.communicator.maximum(np.array([self._signal]))[0]))
+
+    def _booked(self) -> tuple[np.ndarray, np.ndarray]:
+        """Copies of what has left through the domain's sides, and of the number of limited faces."""
+        return self._through.here().copy(), self._limited.here().copy()
+
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
         self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
@@ -146,21 +174,28 @@ class Fluid:
         tiles = tiles[~self.rest.calm[tiles] | (self.tiles[tiles, kernels.SIDES] > 0)]
         output, chosen = self._buffers[_output(stage.number)], self.team.array(tiles)
         real = output.dtype.type
-        rates = (real(dt / h) for h in self.blocks.grid.spacing)
         self.team.run(
             self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
-            self._buffers[0].there, self.input_of(stage), output.there, self._through.there,
-            real(stage.b), real(dt), stage.weight, *rates, *self._tile_box,
+            self._buffers[0].there, self.input_of(stage), output.there, self._through.there, self._limited.there,
+            real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
         )  # fmt: skip
+
+    def rates(self, dt: float) -> list:
+        """dt/h [s/m] along each of three axes, in the fluid's precision."""
+        real = self._buffers[0].dtype.type
+        return [real(dt / h) for h in self.blocks.grid.spacing]
 
     def wake(self, blocks: np.ndarray) -> None:
         """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
         true; to be called before the next stage."""
         self.rest.wake(blocks[self.tiles[:, kernels.BLOCK]])
+        self._signal = None
 
     def fastest_signal(self) -> float:
         """Largest sum over axes of (|u| + c)/h [1/s] on this rank: CFL number per time step. NaN when a cell has no
-        finite state."""
+        valid state."""
+        if self._signal is not None:
+            return self._signal
         if not self.blocks.local_count:
             return 0.0
         real = self._buffers[0].dtype.type
@@ -187,16 +222,23 @@ class Fluid:
         """What a restart needs."""
         return {
             "cells": {"state": self.blocks.without_ghosts(self.state)},
-            "sums": {"through": self._through.here(), "rested": self.rest.counts[None]},
+            "sums": {
+                "through": self._through.here(),
+                "limited": self._limited.here().astype(np.float64),
+                "rested": self.rest.counts[None],
+            },
+            "values": {"rejected_steps": np.array(self.rejected_steps)},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
         self._through.here()[:] = snapshot["sums"]["through"]
-        for pair in (self._buffers[0], self._through):
+        self._limited.here()[:] = snapshot["sums"]["limited"]
+        for pair in (self._buffers[0], self._through, self._limited):
             pair.changed()
         self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
+        self.rejected_steps, self._signal = int(snapshot["values"]["rejected_steps"]), None
         self.rest.wake()
 
     def workload(self) -> np.ndarray:
@@ -207,6 +249,11 @@ class Fluid:
     def memory(self) -> int:
         """Bytes of this rank's fields."""
         return sum(buffer.nbytes for buffer in self._buffers)
+
+    def limited_faces(self) -> int:
+        """Collective. How many faces had their flux limited so far, over all stages; those at the high sides of the
+        domain are not counted."""
+        return int(self.blocks.communicator.concatenate(self._limited.here()).sum())
 
     def share_at_rest(self) -> float:
         """Collective. The part of all tile stages in which the tile was at rest."""

@@ -42,11 +42,16 @@ def total_energy(W):
     return (W[1 + DIMENSIONS] - reference) / OMEGA_1 + kinetic
 
 
-def sound_speed(W):
-    """c^2 = d reference/d rho + (p - reference)/rho + omega p/rho (paper, Eq. 23)."""
+def bulk_modulus(W):
+    """rho c^2 [Pa] = rho d reference/d rho + p - reference + omega p (paper, Eq. 23)."""
     reference, slope = reference_1(W[0])
     p = W[1 + DIMENSIONS]
-    return sqrt(slope + (p - reference + OMEGA_1 * p) / W[0])
+    return W[0] * slope + (p - reference + OMEGA_1 * p)
+
+
+def sound_speed(W):
+    """Speed of sound [m/s]."""
+    return sqrt(bulk_modulus(W) / W[0])
 
 
 def behind_wave(W, s, u_face):

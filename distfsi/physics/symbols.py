@@ -46,7 +46,11 @@ face_flux = chosen("face_flux", "left and right primitive states, normal velocit
 bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest and fastest wave [m/s]")
 contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
 slip_viscosity = chosen("slip_viscosity", "impedances, pressure jump, rho c^2 -> momentum flux per slip [kg/(m2 s)]")
+reserve = chosen("reserve", "cell means, flux, sound speed, rate -> negative where the flux may need limiting")
+is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the flux alone leaves both cells valid")
+limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
+bulk_modulus = chosen("bulk_modulus", "primitive state -> rho c^2 [Pa], positive where the state is admissible")
 sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

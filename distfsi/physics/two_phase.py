@@ -62,8 +62,8 @@ def total_energy(W):
     return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared
 
 
-def sound_speed(W):
-    """Frozen speed of sound c^2 = Y1 c1^2 + Y2 c2^2 (paper, Eqs. 22, 23)."""
+def bulk_modulus(W):
+    """rho c^2 [Pa] of the frozen mixture: a1 rho1 c1^2 + a2 rho2 c2^2 (paper, Eqs. 22, 23)."""
     a1 = W[3 + DIMENSIONS]
     a2 = 1.0 - a1
     p = W[2 + DIMENSIONS]
@@ -71,7 +71,12 @@ def sound_speed(W):
     reference2, slope2 = reference_2(W[1])
     bulk1 = W[0] * slope1 + (p - reference1) + OMEGA_1 * p
     bulk2 = W[1] * slope2 + (p - reference2) + OMEGA_2 * p
-    return sqrt((a1 * bulk1 + a2 * bulk2) / (a1 * W[0] + a2 * W[1]))
+    return a1 * bulk1 + a2 * bulk2
+
+
+def sound_speed(W):
+    """Frozen speed of sound c^2 = Y1 c1^2 + Y2 c2^2 (paper, Eq. 22)."""
+    return sqrt(bulk_modulus(W) / mixture_density(W))
 
 
 def mixture_density(W):
