@@ -25,6 +25,8 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "frontier fluid",
     "stability fluid",
     "kernels",
+    "frontier solid",
+    "stability solid",
 )
 
 

@@ -1,0 +1,219 @@
+"""Where each form of the solid survives: tension, impact, thin plates, long time steps; and why it fails where it does.
+
+A run has survived when it reaches its end with a valid state, its energy kept and, where nothing can break, in one
+piece: no particle may have lost touch with the others.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from threadpoolctl import threadpool_limits
+
+from distfsi.errors import Diverged, InputError
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.verdicts import VerdictMap, draw_verdicts
+from distfsi.scene.description import (
+    Body,
+    Box,
+    Domain,
+    JohnsonCook,
+    MieGrueneisen,
+    Output,
+    Performance,
+    Scene,
+    Solid,
+    Time,
+)
+from distfsi.simulation import Simulation
+from distfsi.study.solids import energy
+
+DIRECTORY = Path("out/study_stability_solid")
+COPPER = MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 2.0, 0.47)
+STRONG = JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
+DENSITY, WIDTH = 8930.0, 1e-2
+FORMS = {"total Lagrangian": "total_lagrangian", "updated Lagrangian": "updated_lagrangian"}
+SURVIVED, BROKEN, LEAKED, FAILED = range(4)
+VERDICTS = {
+    "survived": "tab:green",
+    "broke without a reason": "tab:orange",
+    "lost its energy": "tab:olive",
+    "failed": "tab:red",
+}
+APART = 1.6  # of the spacing, stretched as the body is: farther from all others means broken off
+MOST_STEPS = 20000
+FACTORS = (0.1, 0.2, 0.33, 0.5, 0.67, 0.83, 1.0)  # of the stable step, over 0.3
+
+
+@dataclass(frozen=True)
+class Map:
+    """Runs over a hardness (rows) by particles through the thickness or the time step (columns)."""
+
+    name: str
+    title: str
+    row_label: str
+    rows: tuple[float, ...]
+    column_label: str
+    columns: tuple[float, ...]
+    judge: Callable[[str, float, float], tuple[int, str]]
+
+
+def scene_of(form: str, bodies: Sequence[Body], size: float) -> Scene:
+    """Bodies in a box that reaches `size` [m] to all sides."""
+    lower, upper = (-size, -size), (size, size)
+    return Scene(
+        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None), (0.0, 0.0),
+        None, Solid(tuple(bodies), 1.3, 0.5, 1.0, form=form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
+    )  # fmt: skip
+
+
+def plate(name: str, lower: tuple[float, float], upper: tuple[float, float], spacing: float, speed: float) -> Body:
+    """A copper plate that flies along x [m/s]."""
+    return Body(name, Box(lower, upper), spacing, DENSITY, (speed, 0.0), COPPER, STRONG, None)
+
+
+def advance(simulation: Simulation, end: float, factor: float = 1.0) -> tuple[int, str]:
+    """Run to `end` [s] with the stable step times `factor`; FAILED and why, or SURVIVED."""
+    solid = simulation.solid
+    before, time = energy(simulation), 0.0
+    try:
+        for _ in range(MOST_STEPS):
+            solid.prepare()
+            dt = min(factor * solid.time_step()[0], end - time)
+            if not dt > 0.0:
+                return FAILED, "no time step"
+            solid.advance(dt)
+            solid.migrate()
+            time += dt
+            if time >= end:
+                break
+        else:
+            return FAILED, "the time step shrinks"
+        solid.check(time)
+    except Diverged as error:
+        return FAILED, str(error).partition(":")[0]
+    drift = abs(energy(simulation) / before - 1.0)
+    return (SURVIVED, "") if drift < 1e-8 else (LEAKED, f"energy {drift:.1e}")
+
+
+def pieces(position: np.ndarray, stretch: np.ndarray, spacing: float) -> int:
+    """Number of groups of particles that are within reach of each other once the stretch is taken out."""
+    pairs = cKDTree(position / stretch).query_pairs(APART * spacing, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), (len(position), len(position)))
+    return connected_components(links, directed=False, return_labels=False)
+
+
+def stretched(form: str, strain: float, through: float) -> tuple[int, str]:
+    """A plate, so many particles thick, that flies apart evenly to an engineering strain at 1e5/s."""
+    spacing, rate = WIDTH / 20.0, 1e5
+    half = 0.5 * through * spacing
+    body = plate("plate", (-0.5 * WIDTH, -half), (0.5 * WIDTH, half), spacing, 0.0)
+    simulation = Simulation.of(scene_of(form, [body], 20.0 * WIDTH), Communicator(), 1)
+    c = simulation.solid.columns
+    start = c["position"].copy()
+    c["velocity"] = np.stack([rate * c["position"][:, 0], np.zeros(len(start))], axis=1)
+    c["fixed"] = np.abs(start[:, 0]) > 0.5 * WIDTH - 2.6 * spacing
+    verdict, why = advance_driven(simulation, strain / rate)
+    if verdict != SURVIVED:
+        return verdict, why
+    c = simulation.solid.columns
+    found = pieces(c["position"], np.array([1.0 + strain, 1.0]), spacing)
+    return (SURVIVED, "") if found == 1 else (BROKEN, f"{found} pieces")
+
+
+def advance_driven(simulation: Simulation, end: float) -> tuple[int, str]:
+    """As advance(), with the work of what holds the ends counted."""
+    before = energy(simulation)
+    verdict, why = advance(simulation, end)
+    if verdict != LEAKED:
+        return verdict, why
+    drift = abs((energy(simulation) - simulation.solid.gravity_work()) / before - 1.0)
+    return (SURVIVED, "") if drift < 1e-8 else (LEAKED, f"energy {drift:.1e}")
+
+
+def impact(form: str, speed: float, factor: float, through: float = 8.0) -> tuple[int, str]:
+    """Two plates that meet at a speed [m/s], computed for the time a shock takes through them."""
+    spacing = 1.25e-4 * 8.0 / through
+    thick, wide = 1e-3, 2e-3
+    bodies = (
+        plate("left", (-thick, -0.5 * wide), (0.0, 0.5 * wide), spacing, 0.5 * speed),
+        plate("right", (0.0, -0.5 * wide), (thick, 0.5 * wide), spacing, -0.5 * speed),
+    )
+    simulation = Simulation.of(scene_of(form, bodies, 10.0 * thick), Communicator(), 1)
+    return advance(simulation, 2.0 * thick / 4000.0, factor)
+
+
+def thin(form: str, speed: float, through: float) -> tuple[int, str]:
+    """The same of plates that are so many particles thick."""
+    return impact(form, speed, 1.0, through)
+
+
+SPEEDS = (100.0, 300.0, 1000.0, 2000.0, 3000.0)
+MAPS = (
+    Map(
+        "tension", "Copper plate stretched without failure", "strain", (0.1, 0.3, 0.6, 1.0, 2.0),
+        "particles through the thickness", (1.0, 2.0, 4.0, 8.0), stretched,
+    ),
+    Map(
+        "step", "Copper plates meet", "speed [m/s]", SPEEDS,
+        "time step over the stable one of 0.3 h/c", tuple(f / 0.3 for f in FACTORS), impact,
+    ),
+    Map(
+        "thickness", "Copper plates meet", "speed [m/s]", SPEEDS,
+        "particles through the thickness", (1.0, 2.0, 4.0, 8.0), thin,
+    ),
+)  # fmt: skip
+
+
+def summary(form: str, verdicts: Mapping[tuple[float, float], tuple[int, str]]) -> str:
+    """How often each verdict fell, and where and why it was not survived."""
+    numbers = [number for number, _ in verdicts.values()]
+    counts = ", ".join(f"{numbers.count(n)} {name}" for n, name in enumerate(VERDICTS) if n in numbers)
+    bad = [f"{r:g} by {c:g}: {why}" for (r, c), (number, why) in verdicts.items() if number != SURVIVED]
+    return f"  {form:20} {counts}" + "".join(f"\n      {text}" for text in bad[:6])
+
+
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """The corners of the maps."""
+    _study(communicator, overrides, lambda values: (values[0], values[min(2, len(values) - 1)]))
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Run both forms on all maps; leave a CSV file and a sheet per map in DIRECTORY."""
+    _study(communicator, overrides, lambda values: values)
+
+
+def _study(communicator, overrides, some) -> None:
+    if communicator.size > 1 or overrides:
+        raise InputError(["study stability solid: runs on one rank and takes no overrides"])
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    lines = []
+    with threadpool_limits(1):
+        for shown in MAPS:
+            print(f"\n{shown.title}: {shown.row_label} by {shown.column_label}")
+            rows, columns, sheets = some(shown.rows), some(shown.columns), []
+            for name, form in FORMS.items():
+                verdicts = {(r, c): shown.judge(form, r, c) for r in rows for c in columns}
+                print(summary(name, verdicts), flush=True)
+                sheets.append(VerdictMap(name, np.array([[verdicts[r, c][0] for c in columns] for r in rows])))
+                lines += [[shown.name, name, f"{r:g}", f"{c:.3g}", *told(v)] for (r, c), v in verdicts.items()]
+            names = ([f"{v:.3g}" for v in values] for values in (rows, columns))
+            labels = zip((shown.row_label, shown.column_label), names, strict=True)
+            draw_verdicts(DIRECTORY / f"{shown.name}.png", shown.title, sheets, *labels, VERDICTS, across=2)
+    with (DIRECTORY / "stability.csv").open("w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["map", "form", "row", "column", "verdict", "why"])
+        table.writerows(lines)
+    print(f"\nmaps and table in {DIRECTORY}", flush=True)
+
+
+def told(verdict: tuple[int, str]) -> tuple[str, str]:
+    """A verdict in words."""
+    return list(VERDICTS)[verdict[0]], verdict[1]
