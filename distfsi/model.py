@@ -13,7 +13,7 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
-from distfsi.physics import euler, limiters, positivity, riemann, two_phase
+from distfsi.physics import euler, five_equation, limiters, positivity, riemann, two_phase
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
@@ -24,7 +24,7 @@ RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity alo
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
     "adaptive": (riemann.einfeldt_speeds, riemann.sharp, riemann.shear_along_shocks),
 }
-MODELS = {1: euler, 2: two_phase}
+TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equation, 1)}  # fluxes beyond the state's
 
 
 @dataclass(frozen=True)
@@ -108,19 +108,20 @@ def fluid_model(scene: Scene) -> FluidModel:
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
     eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
+    model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
-        "FLUXES": variables + (3 if phases == 2 else 0),
+        "FLUXES": variables + more_fluxes,
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
-    model = MODELS[phases]
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
+    bindings["state_behind_wave"] = Bound(model.behind_wave)
     bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
     bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
     solver = zip(
@@ -128,4 +129,18 @@ def fluid_model(scene: Scene) -> FluidModel:
     )
     bindings |= {name: Bound(function) for name, function in solver}
     bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
+    bindings |= {f"stored_reference_{k}": reference for k, reference in enumerate(_stored_references(fluid, eos), 1)}
     return FluidModel(constants, bindings, eos, dimensions)
+
+
+def _stored_references(fluid: Fluid, eos: tuple[FluidEos, ...]) -> list[Bound]:
+    """In float32 the energies of stiffened gases are counted from those of their first state without pressure."""
+    found = []
+    for k, (phase, formula) in enumerate(zip(fluid.phases, eos, strict=True)):
+        first = next((region.state for region in fluid.regions if region.state.phase == k), None)
+        shifted = fluid.precision == "float32" and isinstance(phase.eos, StiffenedGas) and first is not None
+        rest = {"REST_DENSITY": first.density} if shifted else {}
+        found.append(
+            Bound(stiffened_gas.shifted_reference, formula.reference.constants | rest) if shifted else formula.reference
+        )
+    return found

@@ -16,10 +16,10 @@ TRACE = 1e-6
 
 
 def model_of(
-    *names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod", riemann: str = "hllc"
+    *names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod", riemann: str = "hllc", **method
 ) -> FluidModel:
     """The model of a fluid made of `MATERIALS`."""
     phases = tuple(Phase(name, MATERIALS[name]) for name in names)
-    fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann)
+    fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
     domain = SimpleNamespace(dimensions=dimensions)
     return fluid_model(SimpleNamespace(fluid=fluid, domain=domain, gravity=gravity or (0.0,) * dimensions))

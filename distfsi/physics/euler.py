@@ -17,6 +17,7 @@ from distfsi.physics.symbols import (
     contact_jump_diffusion,
     reference_1,
     slip_viscosity,
+    stored_reference_1,
 )
 
 
@@ -25,7 +26,7 @@ def primitives(U):
     rho = U[0]
     velocity = tuple(U[1 + d] / rho for d in static_range(DIMENSIONS))
     kinetic = 0.5 * sum(U[1 + d] * velocity[d] for d in static_range(DIMENSIONS))
-    reference, slope = reference_1(rho)
+    reference, slope = stored_reference_1(rho)
     p = OMEGA_1 * (U[1 + DIMENSIONS] - kinetic) + reference
     return (rho, *(velocity[d] for d in static_range(DIMENSIONS)), p)
 
@@ -37,7 +38,7 @@ def conserved(W):
 
 def total_energy(W):
     """rho E [J/m3]."""
-    reference, slope = reference_1(W[0])
+    reference, slope = stored_reference_1(W[0])
     kinetic = 0.5 * W[0] * sum(W[1 + d] * W[1 + d] for d in static_range(DIMENSIONS))
     return (W[1 + DIMENSIONS] - reference) / OMEGA_1 + kinetic
 

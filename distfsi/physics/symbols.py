@@ -26,9 +26,11 @@ DIMENSIONS = Symbol("number of space dimensions, 1 to 3")
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 
-PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 (six-equation model)")
+PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 (six- or five-equation model)")
 VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the volume fraction when there are two phases")
-FLUXES = Symbol("values per face: VARIABLES, and for two phases both phase energies and the face velocity")
+FLUXES = Symbol(
+    "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
+)
 GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
 OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega rho e")
@@ -39,6 +41,10 @@ LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside 
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+stored_reference_1 = chosen(
+    "stored_reference_1", "as reference_1, to the energy that is stored: p = reference + omega rho e"
+)
+stored_reference_2 = chosen("stored_reference_2", "as reference_2, to the energy that is stored")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
 primitives = chosen("primitives", "conserved state -> primitive state")
 conserved = chosen("conserved", "primitive state -> conserved state")
@@ -46,6 +52,7 @@ face_flux = chosen("face_flux", "left and right primitive states, normal velocit
 bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest and fastest wave [m/s]")
 contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
 slip_viscosity = chosen("slip_viscosity", "impedances, pressure jump, rho c^2 -> momentum flux per slip [kg/(m2 s)]")
+state_behind_wave = chosen("state_behind_wave", "primitive state, wave and face speeds -> all transported densities")
 reserve = chosen("reserve", "cell means, flux, sound speed, rate -> negative where the flux may need limiting")
 is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the flux alone leaves both cells valid")
 limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")

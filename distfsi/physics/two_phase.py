@@ -23,6 +23,9 @@ from distfsi.physics.symbols import (
     reference_1,
     reference_2,
     slip_viscosity,
+    state_behind_wave,
+    stored_reference_1,
+    stored_reference_2,
 )
 
 
@@ -35,8 +38,8 @@ def primitives(U):
     rho = U[0] + U[1]
     velocity = tuple(U[2 + d] / rho for d in static_range(DIMENSIONS))
     kinetic = 0.5 * sum(U[2 + d] * velocity[d] for d in static_range(DIMENSIONS))
-    reference1, slope1 = reference_1(rho1)
-    reference2, slope2 = reference_2(rho2)
+    reference1, slope1 = stored_reference_1(rho1)
+    reference2, slope2 = stored_reference_2(rho2)
     energy = U[2 + DIMENSIONS] - kinetic + a1 * (reference1 / OMEGA_1) + a2 * (reference2 / OMEGA_2)
     p = energy / (a1 * (1.0 / OMEGA_1) + a2 * (1.0 / OMEGA_2))
     return (rho1, rho2, *(velocity[d] for d in static_range(DIMENSIONS)), p, a1)
@@ -55,8 +58,8 @@ def total_energy(W):
     a1 = W[3 + DIMENSIONS]
     a2 = 1.0 - a1
     p = W[2 + DIMENSIONS]
-    reference1, slope1 = reference_1(W[0])
-    reference2, slope2 = reference_2(W[1])
+    reference1, slope1 = stored_reference_1(W[0])
+    reference2, slope2 = stored_reference_2(W[1])
     internal = a1 * ((p - reference1) / OMEGA_1) + a2 * ((p - reference2) / OMEGA_2)
     squared = sum(W[2 + d] * W[2 + d] for d in static_range(DIMENSIONS))
     return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared
@@ -126,7 +129,8 @@ def behind_wave(W, s, u_face):
 
 
 def face_flux(left, right, jump):
-    """Fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27).
+    """Fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27); in the
+    five-equation model without phase energies.
 
     Everything is smeared alike (physics/riemann.py), so that pressure and velocity stay uniform across an interface.
     jump [Pa]: the largest pressure difference along the face.
@@ -145,7 +149,7 @@ def face_flux(left, right, jump):
     u, p = W[2], W[2 + DIMENSIONS]
     u_face = s_star if subsonic else u
     p_face = p + rho * (s - u) * (u_face - u)
-    U, U_there = behind_wave(W, s, u_face), behind_wave(there, s_there, s_star)
+    U, U_there = state_behind_wave(W, s, u_face), state_behind_wave(there, s_there, s_star)
 
     reach = s if subsonic else 0.0
     kappa = contact_jump_diffusion(reach, s_there, s_star)
@@ -164,6 +168,21 @@ def face_flux(left, right, jump):
     )
 
 
+def updated_conserved(U_n, U, D, b, dt):
+    """U_n + b (U - D + dt S - U_n) of masses, momentum and total energy; S is the body force and its work."""
+    rho = U[0] + U[1]
+    work = sum(GRAVITY[d] * U[2 + d] for d in static_range(DIMENSIONS))
+    return (
+        U_n[0] + b * (U[0] - D[0] - U_n[0]),
+        U_n[1] + b * (U[1] - D[1] - U_n[1]),
+        *(
+            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (GRAVITY[d] * rho) - U_n[2 + d])
+            for d in static_range(DIMENSIONS)
+        ),
+        U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS]),
+    )
+
+
 def updated(U_n, U, W, D, b, dt):
     """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure.
 
@@ -176,15 +195,7 @@ def updated(U_n, U, W, D, b, dt):
     p, a1 = W[2 + DIMENSIONS], W[3 + DIMENSIONS]
     a2_n, a2, du = 1.0 - a1_n, 1.0 - a1, D[VARIABLES + 2]
 
-    m1 = U_n[0] + b * (U[0] - D[0] - U_n[0])
-    m2 = U_n[1] + b * (U[1] - D[1] - U_n[1])
-    rho = U[0] + U[1]
-    momentum = tuple(
-        U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (GRAVITY[d] * rho) - U_n[2 + d]) for d in static_range(DIMENSIONS)
-    )
-    work = sum(GRAVITY[d] * U[2 + d] for d in static_range(DIMENSIONS))
-    E = U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS])
-
+    new = updated_conserved(U_n, U, D, b, dt)
     da = b * (a1 - D[3 + DIMENSIONS] + a1 * du - a1_n)
     da = min(max(da, MINIMUM_FRACTION - a1_n), (1.0 - MINIMUM_FRACTION) - a1_n)
     reference1_n, slope1_n = reference_1(W_n[0])
@@ -196,7 +207,7 @@ def updated(U_n, U, W, D, b, dt):
     de1 = b * (e1 - D[VARIABLES] + a1 * p * -du - e1_n)
     de2 = b * (e2 - D[VARIABLES + 1] + a2 * p * -du - e2_n)
     relaxed = relaxed_fraction_change(
-        p_n, a1_n + da, da, m1, m2, reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2
+        p_n, a1_n + da, da, new[0], new[1], reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2
     )
     a1_new = min(max(a1_n + (da + relaxed), MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-    return (m1, m2, *(momentum[d] for d in static_range(DIMENSIONS)), E, a1_new)
+    return (*(new[v] for v in static_range(3 + DIMENSIONS)), a1_new)

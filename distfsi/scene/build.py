@@ -67,7 +67,14 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         for axis in AXES[:dimensions]
     )
     return Fluid(
-        phases, regions, given.reconstruction, given.minimum_volume_fraction, inflow, given.precision, given.riemann
+        phases,
+        regions,
+        given.reconstruction,
+        given.minimum_volume_fraction,
+        inflow,
+        given.precision,
+        given.riemann,
+        given.model,
     )
 
 

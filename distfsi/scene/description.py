@@ -11,6 +11,7 @@ from typing import Literal
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
+TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
@@ -128,7 +129,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: the six-equation model."""
+    """The compressible flow. One phase: Euler; two: `model`."""
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
@@ -137,6 +138,7 @@ class Fluid:
     inflow: tuple[tuple[FluidState | None, FluidState | None], ...]  # per axis, per side
     precision: Literal["float64", "float32"]
     riemann: RiemannSolver = "hllc"
+    model: TwoPhaseModel = "six_equation"
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

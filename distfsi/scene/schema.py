@@ -105,6 +105,9 @@ class FluidInput(Table):
     riemann: description.RiemannSolver = Field(
         "hllc", description='flux; "adaptive": "hllc" with shear along strong shocks, against carbuncles'
     )
+    model: description.TwoPhaseModel = Field(
+        "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
+    )
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region"
     )
