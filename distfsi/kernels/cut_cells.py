@@ -184,10 +184,10 @@ def open_between(kind, old, new, at, axis, step, cells):
 
 @helper
 def flux_beside_wall(U, kind, old, new, at, cells, steps, rates, axis, P, T, F):
-    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage; rates (D,): dt/h.
+    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage.
 
-    P holds five lines of four cells: the one through the face, and those beside it if the flux looks there. The slope
-    of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
+    rates (D,): dt/h per axis. P holds five lines of four cells: the one through the face, and those beside it if the
+    flux looks there. The slope of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
     """
     first, step = at + at // cells * (VARIABLES - 1) * cells, steps[axis]
     for c in range(4):
@@ -274,9 +274,8 @@ def book_sides(
     begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, rates, weights
 ):  # fmt: skip
     """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
-    1 high), beyond what leaves there, for the cells `chosen`.
-
-    rates (D,): dt/h per axis; weights (D,): share of the stage * dt * area of a face.
+    1 high), beyond what leaves there, for the cells `chosen`. rates (D,): dt/h per axis; weights (D,): share of the
+    stage * dt * area of a face.
     """
     cells = shape[0] * shape[1] * shape[2]
     P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)

@@ -148,7 +148,7 @@ class CutCells:
 
     def after_stage(self, stage: Stage, dt: float) -> None:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
-        rates, weight = np.array(self.fluid.rates(dt)[: self._dimensions]), stage.weight * dt
+        rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
         self._run(
             self.fluid_kernels.advance_band, self._start, self._input, self._output, self.swept.reshape(-1),
             self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
