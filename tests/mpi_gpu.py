@@ -7,6 +7,7 @@ from itertools import cycle
 
 import numpy as np
 
+from distfsi.device import cuda
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostRuntime
@@ -54,7 +55,7 @@ def result(name, device):
     names, dimensions, method = SCENES[name]
     simulation = Simulation.of(scene(names, dimensions, **method), Communicator(), device=device)
     fluid, messenger = simulation.fluid, None
-    if isinstance(device, Gpu):
+    if isinstance(device, Gpu) and isinstance(device.runtime, HostRuntime):
         fluid.exchange._world = messenger = Messenger(fluid.exchange._world, device.runtime)
     for _ in range(STEPS):
         simulation.step()
@@ -103,6 +104,15 @@ def check_scenes():
 
 def nothing(*_, **__):
     """In the place of something that is needed."""
+
+
+def check_gpu():
+    """Every scene on the GPUs of this node."""
+    for name in SCENES:
+        expected = result(name, Team(1))
+        gpu = cuda.gpu_of(Communicator().local_rank)
+        assert same(result(name, gpu), expected), name
+        print(f"{name}: same bits on {cuda.gpu_name(0)}")
 
 
 def check_mutants():
@@ -163,4 +173,4 @@ MUTANTS = {
 
 if __name__ == "__main__":
     install_abort_on_exception(Communicator())
-    {"scenes": check_scenes, "mutants": check_mutants}[sys.argv[1]]()
+    {"scenes": check_scenes, "mutants": check_mutants, "gpu": check_gpu}[sys.argv[1]]()

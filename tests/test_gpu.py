@@ -37,6 +37,12 @@ def test_arrays_of_the_device_stay_there():
             misuse(array)
 
 
+@pytest.mark.gpu
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_fluid_scenes_on_a_gpu_have_the_bits_of_the_cpu(mpiexec, ranks):
+    assert mpiexec(ranks, SCRIPT, "gpu").count("same bits on") == 3 * ranks
+
+
 # ---- CuPy ------------------------------------------------------------------------------------------------------------
 
 

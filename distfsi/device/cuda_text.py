@@ -36,8 +36,8 @@ WORDS = {
     "len": "length",
 }
 WORDS |= {"exp": "exponential", "log": "logarithm", "pow": "power", "sqrt": "square_root", "real": "real"}
-C_TYPES = {"float64": "double", "float32": "float", "int64": "long long", "int32": "int", "uint8": "unsigned char"}
-C_TYPES |= {"bool": "bool"}
+C_TYPES = {"float64": "double", "float32": "float", "bool": "bool", "int64": "long long", "int32": "int"}
+C_TYPES |= {"int8": "signed char", "uint8": "unsigned char"}
 THREADS = 128  # in a block, of kernels with one thread per item
 TAKEN = frozenset(  # words of C++ and of device/runtime.h
     """alignas and asm auto bool case catch char class const default delete do double enum explicit export extern false

@@ -94,17 +94,30 @@ template <class T, int N> struct Array {
         for (int axis = 0; axis < N; axis++) values *= shape[axis].value;
         return values;
     }
+    template <class... I> __device__ __forceinline__ long long flat(I... index) const
+    {
+        const long long place[] = {(long long)index...};
+        long long flat = place[0];
+        for (int axis = 1; axis < N; axis++)
+            flat = flat * shape[axis].value + (axis < int(sizeof...(I)) ? place[axis < int(sizeof...(I)) ? axis : 0] : 0);
+        return flat;
+    }
     template <class... I> __device__ __forceinline__ T &at(I... index) const
     {
         static_assert(sizeof...(I) == N, "one index per axis");
-        const long long place[N] = {(long long)index...};
-        long long flat = place[0];
-        for (int axis = 1; axis < N; axis++) flat = flat * shape[axis].value + place[axis];
-        return data[flat];
+        return data[flat(index...)];
     }
-    template <class... I> __device__ __forceinline__ typename Widened<T>::type operator()(I... index) const
+    // A value, or with fewer indices than axes the array of the rest.
+    template <class... I> __device__ __forceinline__ auto operator()(I... index) const
     {
-        return at(index...);
+        if constexpr (sizeof...(I) == N) {
+            return (typename Widened<T>::type)data[flat(index...)];
+        } else {
+            Array<T, N - int(sizeof...(I))> rest;
+            rest.data = data + flat(index...);
+            for (int axis = int(sizeof...(I)); axis < N; axis++) rest.shape[axis - int(sizeof...(I))] = shape[axis];
+            return rest;
+        }
     }
 };
 
@@ -126,6 +139,15 @@ template <class... T> struct Tuple {};
 template <class H, class... R> struct Tuple<H, R...> {
     H head;
     Tuple<R...> tail;
+
+    // Of values of one type, by an index known at run time only.
+    __device__ __forceinline__ H operator()(long long index) const
+    {
+        if constexpr (sizeof...(R) == 0)
+            return head;
+        else
+            return index == 0 ? head : tail(index - 1);
+    }
 };
 
 DEVICE Tuple<> pack() { return {}; }
@@ -139,7 +161,7 @@ template <int K, class H, class... R> DEVICE auto item(Tuple<H, R...> tuple)
         return item<K - 1>(tuple.tail);
 }
 
-template <int K, class T> DEVICE auto item(Array<T, 1> array) { return array(K); }
+template <int K, class T, int N> DEVICE auto item(Array<T, N> array) { return array(K); }
 
 // ---- mathematics ------------------------------------------------------------------------------------------------------
 
@@ -161,6 +183,7 @@ DEVICE float magnitude(float x) { return fabsf(x); }
 DEVICE integer magnitude(integer x) { return x.value < 0 ? -x.value : x.value; }
 DEVICE double square_root(double x) { return sqrt(x); }
 DEVICE float square_root(float x) { return sqrtf(x); }
+DEVICE double square_root(integer x) { return sqrt((double)x.value); }
 DEVICE double logarithm(double x) { return log(x); }
 DEVICE float logarithm(float x) { return logf(x); }
 DEVICE double power(double x, double y) { return pow(x, y); }
