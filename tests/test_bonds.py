@@ -60,6 +60,22 @@ def test_a_linear_field_is_exact_everywhere(dimensions, spacing):
     assert np.allclose(c["density"], 1000.0 / np.linalg.det(expected), rtol=1e-13)
 
 
+def test_the_time_step_follows_the_most_compressed_particle():
+    part = rubber_ball(2, 0.1)
+    c = part.columns
+    part.prepare()
+    whole, _ = part.time_step()
+    c["velocity"][:, 1] = -0.5 * np.maximum(c["position"][:, 1], 0.0) ** 3
+    part.drift(1.0)
+    part.prepare()
+    dt, reason = part.time_step()
+    stretches = np.linalg.svd(c["deformation"].reshape(-1, 2, 2), compute_uv=False)[:, -1]
+    shortest = int(np.argmin(stretches))
+    assert reason == f"sound of solid particle {c['id'][shortest]}"
+    assert stretches[shortest] < 0.8
+    assert dt == pytest.approx(stretches[shortest] * whole, rel=0.2)  # denser rubber is slower
+
+
 @pytest.mark.parametrize(("dimensions", "spacing"), [(2, 0.25), (3, 0.25)])
 def test_a_rigid_turn_keeps_the_stress(dimensions, spacing):
     part = rubber_ball(dimensions, spacing)
