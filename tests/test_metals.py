@@ -2,7 +2,7 @@
 
 import pytest
 
-from distfsi.study import solids
+from distfsi.study import frontier_solid, solids, stability_solid
 
 
 def missed(problem, spacing, *settings):
@@ -42,3 +42,26 @@ def test_an_imploding_shell_finely(settings):
 @pytest.mark.full
 def test_the_cantilever_swings_with_timoshenkos_period():
     assert missed(solids.CANTILEVER, 1e-3) == []
+
+
+# ---- the studies -----------------------------------------------------------------------------------------------------
+
+
+def test_the_frontier_keeps_what_nothing_beats():
+    def outcome(variant, seconds, error):
+        return frontier_solid.Outcome(variant, 1.0, 1, 1, seconds, (solids.Figure("a", 1.0 + error, 1.0, 0.1),))
+
+    found = [
+        outcome("slow", 3.0, 0.1),
+        outcome("fast", 1.0, 0.3),
+        outcome("beaten", 2.0, 0.4),
+        outcome("best", 4.0, 0.01),
+    ]
+    found.append(frontier_solid.Outcome("failed", 1.0, 1, 1, float("nan"), (), "diverged"))
+    assert [o.variant for o in frontier_solid.front(found)] == ["fast", "slow", "best"]
+
+
+def test_stretched_plates_stay_whole_with_bonds_alone():
+    assert stability_solid.stretched("total_lagrangian", 0.6, 1.0) == (stability_solid.SURVIVED, "")
+    verdict, why = stability_solid.stretched("updated_lagrangian", 0.6, 1.0)
+    assert (verdict, why.endswith("pieces")) == (stability_solid.BROKEN, True)
