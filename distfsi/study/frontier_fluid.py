@@ -185,12 +185,12 @@ def write(rows: Sequence[tuple[Problem, Outcome, bool]]) -> None:
     with (DIRECTORY / "frontier.csv").open("w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         names = [f"error of {quantity}" for quantity in QUANTITIES]
-        table.writerow(["problem", "method", "cells", "steps", "seconds", "error", *names, "on the front", "failure"])
+        table.writerow(["problem", "method", "cells", "seconds", "error", *names, "on the front", "failure"])
         for problem, o, best in rows:
             errors = o.errors if o.errors is not None else [np.nan] * len(QUANTITIES)
             numbers = [f"{value:.4g}" for value in (o.seconds, o.error, *errors)]
             front = "yes" if best else "no"
-            table.writerow([problem.name, o.variant.name, o.cells, o.steps, *numbers, front, o.failure])
+            table.writerow([problem.name, o.variant.name, o.cells, *numbers, front, o.failure])
 
 
 def compare(problem: Problem, chosen: Sequence[Variant], cells: int, overrides: Sequence[str]) -> list[Outcome]:

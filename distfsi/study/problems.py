@@ -155,7 +155,7 @@ def slab(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
     return rows * density, rows * outside.velocity[0], rows * outside.pressure
 
 
-RINGS_PER_CELL = 20
+RINGS = 2500  # of the radial computation, from the axis to a side of the domain
 
 
 def explosion(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
@@ -166,10 +166,9 @@ def explosion(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarra
 def _rings(scene: Scene) -> Rings:
     water, gas = (PureState(r.state.density, r.state.pressure) for r in scene.fluid.regions)
     eos_water, eos_gas = (scene.fluid.phases[r.state.phase].eos for r in scene.fluid.regions)
-    corner = float(np.hypot(*scene.domain.upper))
-    spacing = scene.domain.spacing[0] / RINGS_PER_CELL
-    radius = scene.fluid.regions[1].shape.radius
-    return _rings_of(gas, water, StiffenedGas(eos_gas.gamma, 0.0), eos_water, radius, corner, scene.time.end, spacing)
+    radius, side = scene.fluid.regions[1].shape.radius, scene.domain.upper[0]
+    eos = StiffenedGas(eos_gas.gamma, 0.0), eos_water
+    return _rings_of(gas, water, *eos, radius, side, scene.time.end, side / RINGS)
 
 
 _rings_of = cache(cylindrical_explosion)
