@@ -31,6 +31,7 @@ def draw_verdicts(
     columns: tuple[str, Sequence[str]], colors: Mapping[str, str], across: int = 4,
 ) -> Path:  # fmt: skip
     """Draw maps side by side; returns `path`. `rows` and `columns`: a label and names; `colors`: of verdict 0, 1 …"""
+    across = min(across, max(2, len(maps)))  # two leave room for the legend
     down = -(-len(maps) // across)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(across * WIDTH, down * HEIGHT + HEAD), layout="constrained")
