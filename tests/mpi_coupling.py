@@ -4,6 +4,7 @@ mpi_coupling.py    runs the cases with 1 and 2 threads and other blocks; rank 0 
 """
 
 import hashlib
+import math
 from itertools import product
 
 import numpy as np
@@ -33,6 +34,17 @@ def body(shape, spacing, density, velocity, fixed=None, stiffness=50.0):
         d.Elastic(0.4 * stiffness),
         fixed,
     )
+
+
+def shock(mach):
+    """Density, pressure and speed of the gas (gamma 1.4) behind a shock into rho = p = 1, its speed, and the pressure
+    behind its reflection from a wall."""
+    g, c = 1.4, math.sqrt(1.4)
+    pressure = 1.0 + 2.0 * g / (g + 1.0) * (mach**2 - 1.0)
+    density = (g + 1.0) * mach**2 / ((g - 1.0) * mach**2 + 2.0)
+    velocity = 2.0 * c / (g + 1.0) * (mach - 1.0 / mach)
+    reflected = pressure * ((3.0 * g - 1.0) * pressure - (g - 1.0)) / ((g - 1.0) * pressure + g + 1.0)
+    return density, pressure, velocity, mach * c, reflected
 
 
 class Coupled:

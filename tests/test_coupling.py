@@ -8,7 +8,7 @@ from scipy.ndimage import label
 
 from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from launch import run_ranks
-from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock
 
 # ---- covered cells --------------------------------------------------------------------------------------------------
 
@@ -66,17 +66,6 @@ def test_gas_at_rest_around_a_clamped_body_stays_at_rest(phases, precision):
     assert np.abs(velocity).max() < accuracy
     assert np.abs(U[0] / U[0, 0] - 1.0).max() < accuracy
     assert np.abs(impulse).max() < accuracy * dt * 1.7
-
-
-def shock(mach):
-    """Density, pressure and speed of the gas (gamma 1.4) behind a shock into rho = p = 1, its speed, and the pressure
-    behind its reflection from a wall."""
-    g, c = 1.4, math.sqrt(1.4)
-    pressure = 1.0 + 2.0 * g / (g + 1.0) * (mach**2 - 1.0)
-    density = (g + 1.0) * mach**2 / ((g - 1.0) * mach**2 + 2.0)
-    velocity = 2.0 * c / (g + 1.0) * (mach - 1.0 / mach)
-    reflected = pressure * ((3.0 * g - 1.0) * pressure - (g - 1.0)) / ((g - 1.0) * pressure + g + 1.0)
-    return density, pressure, velocity, mach * c, reflected
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3])

@@ -23,7 +23,6 @@ from distfsi.physics.tensors import dot
 FILLED = 0.99  # of the kernel: a body is thick where a particle is as deep as this
 FADING = 0.05  # of the kernel: over which the balls vanish as a body becomes thick
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
-SLIVER = 0.1  # of a cell: with less and without a neighbour to join the fluid is shut in
 
 SHUT = DEEP  # a cell whose faces are closed, with fluid in it
 
@@ -247,9 +246,8 @@ def find_masters(
 ):  # fmt: skip
     """master (blocks, D, Z, Y, X) = where the fluid of a needy cell finds its company, 0 if nowhere or not needy.
 
-    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED. The fluid of a SHUT
-    cell has to move to the neighbour that is its `master`, if it has one. swept (blocks, fields, …): first the volume
-    of the fluid.
+    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED. swept (blocks,
+    fields, …): first the volume of the fluid.
     offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
     """
     cells = shape[0] * shape[1] * shape[2]
@@ -297,21 +295,38 @@ def find_masters(
                             master[first + d * cells] = offsets[chosen, d]
                     elif load(swept, share) <= 0.0:
                         kind[at] = COVERED
-                    elif smaller(fraction_old, fraction_new, at) < SLIVER:
+                    else:
                         kind[at] = SHUT
-                        most = SLIVER
-                        for axis in range(DIMENSIONS):
-                            for side in range(2):
-                                way = 2 * side - 1
-                                there = at + way * steps[axis]
-                                part = smaller(fraction_old, fraction_new, there)
-                                face = at + side * steps[axis]
-                                inside = index[axis] + way >= 0 and index[axis] + way < grid_cells[axis]
-                                if inside and part >= most and load(swept, share + way * steps[axis]) > 0.0:
-                                    if opening(aperture_old, aperture_new, face, axis, cells) > 0.0:
-                                        most = part
-                                        for d in range(DIMENSIONS):
-                                            master[first + d * cells] = way if d == axis else 0
+
+
+@driver
+def find_refuges(
+    begin, end, near, kind, master, fraction_new, aperture_old, aperture_new, steps, shape, origin, extent, grid_cells
+):  # fmt: skip
+    """master of SHUT cells = the most open of the FLUID cells behind open faces, which takes their fluid; 0 if none."""
+    cells = shape[0] * shape[1] * shape[2]
+    for b in range(begin, end):
+        if near[b] == 0:
+            continue
+        for k in range(extent[b, 2]):
+            for j in range(extent[b, 1]):
+                for i in range(extent[b, 0]):
+                    at = cell_at(b, i, j, k, shape)
+                    if kind[at] != SHUT:
+                        continue
+                    first = at + b * (DIMENSIONS - 1) * cells
+                    index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
+                    most = 0.0
+                    for axis in range(DIMENSIONS):
+                        for side in range(2):
+                            way = 2 * side - 1
+                            inside = index[axis] + way >= 0 and index[axis] + way < grid_cells[axis]
+                            part = load(fraction_new, at + way * steps[axis])
+                            if inside and kind[at + way * steps[axis]] == FLUID and part > most:
+                                if opening(aperture_old, aperture_new, at + side * steps[axis], axis, cells) > 0.0:
+                                    most = part
+                                    for d in range(DIMENSIONS):
+                                        master[first + d * cells] = way if d == axis else 0
 
 
 # ---- lists ----------------------------------------------------------------------------------------------------------

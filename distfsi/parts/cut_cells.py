@@ -247,6 +247,7 @@ class CutCells:
         """Which cells join which, and the lists of the band's and the covered cells."""
         self.wall.find_masters(self.kind, self._master, self.swept)
         self._exchange(self.kind, np.array([-1]), immersed_kernels.FLUID)
+        self.wall.find_refuges(self.kind, self._master)
         self._exchange(self._master, np.arange(self._dimensions), 0)
         self._band, self._covered = self.wall.lists(self.kind, self.swept)
         self._evict()

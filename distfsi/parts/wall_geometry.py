@@ -26,6 +26,7 @@ DRIVERS = (
     kernels.find_distances,
     kernels.open_up,
     kernels.find_masters,
+    kernels.find_refuges,
     kernels.sort_cells,
     kernels.list_band,
 )
@@ -146,6 +147,14 @@ class WallGeometry:
             self.kernels.find_masters, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),
             *self.parts, swept.reshape(-1), swept.shape[1], *self.faces, self.offsets, self._sequences, self.steps,
             self.shape, blocks.origin, blocks.extent, self.cells,
+        )  # fmt: skip
+
+    def find_refuges(self, kind: np.ndarray, master: np.ndarray) -> None:
+        """Where the fluid of cells that are shut can go; after the ghosts of `kind` are known."""
+        blocks = self.blocks
+        self.team.run(
+            self.kernels.find_refuges, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),
+            self.parts[1], *self.faces, self.steps, self.shape, blocks.origin, blocks.extent, self.cells,
         )  # fmt: skip
 
     def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
