@@ -32,7 +32,7 @@ main(sys.argv[1:])
 def run_tube(directory, ranks):
     changes = [*TUBE, "time.maximum_steps=25", f"output.directory={directory}", "output.history_every=3"]
     options = [word for change in changes for word in ("--set", change)]
-    return run_ranks(ranks, ["-c", PROGRAM, "run", ROOT / "inputs/steel_tube.toml", "--threads", "1", *options], 120)
+    return run_ranks(ranks, ["-c", PROGRAM, "run", ROOT / "inputs/steel_tube.toml", "--threads", "1", *options], 300)
 
 
 def test_no_bit_depends_on_who_owns_a_block(tmp_path):
