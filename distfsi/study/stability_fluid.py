@@ -1,8 +1,8 @@
 """Where each method of the fluid survives: maps of hard Riemann problems, and why it fails where it does.
 
 Every run is a tube of few cells until its fastest wave has gone most of the way to an end. It has survived when it
-reaches the end with a valid state in every cell. What survives but swings (its velocity varies much more along the tube
-than the exact one) is told apart.
+reaches the end with a valid state in every cell; with help, if fluxes were limited or steps redone on the way. What
+survives but swings (its velocity varies much more along the tube than the exact one) is told apart.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Map:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a run, and why it failed."""
+    """What became of a run; why it failed, or what helped it."""
 
     number: int
     why: str = ""
@@ -178,7 +178,8 @@ def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
         return Verdict(FAILED, _cause(error))
     if _swings(simulation, tube):
         return Verdict(SWUNG)
-    return Verdict(SURVIVED)
+    faces, redone = simulation.fluid.limited_faces(), simulation.rejected_steps
+    return Verdict(HELPED, f"{faces} limited faces; {redone} redone steps") if faces or redone else Verdict(SURVIVED)
 
 
 def _cause(error: Diverged) -> str:
