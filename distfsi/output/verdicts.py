@@ -47,11 +47,11 @@ def draw_verdicts(
             axes.set_yticks(np.arange(len(rows[1])) + 0.5, rows[1], fontsize=7)
         for axes in list(grid.flat)[len(maps) :]:
             axes.set_visible(False)
-        figure.supxlabel(columns[0], fontsize=9)
+        figure.supxlabel(columns[0], x=0.01, ha="left", fontsize=9)
         figure.supylabel(rows[0], fontsize=9)
         figure.suptitle(title, fontsize=10)
         patches = [Patch(color=color, label=name) for name, color in colors.items()]
-        figure.legend(handles=patches, loc="outside lower right", ncols=len(patches), frameon=False)
+        figure.legend(handles=patches, loc="outside lower right", ncols=len(patches), frameon=False, fontsize=7)
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=RESOLUTION)
     return path
