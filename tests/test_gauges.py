@@ -96,7 +96,7 @@ GAUGES = (
     "gauges.marked={kind='particle', body='tube', position=['-29 mm', 0]}",
     "gauges.tube={kind='body', body='tube'}",
 )
-COARSE = ("domain.cells=[64,64]", "solid.bodies.tube.spacing=1.2 mm", "time.end=1.2 us")
+COARSE = ("domain.cells=[96,96]", "solid.bodies.tube.spacing=1.2 mm", "time.end=1.2 us")
 FIELDS = ("output.peaks=true", "output.schlieren=true", "output.fields_every=0.4 us")
 
 
@@ -128,7 +128,7 @@ def test_gauges_do_not_depend_on_the_ranks(tubes):
 
 
 def test_the_force_on_a_body_is_its_rate_of_momentum(tubes):
-    """A free body: to round-off. Displacement and velocity belong together."""
+    """A free body: to round-off. It moves with its velocity after the last step's force."""
     gauge = read_history(tubes[1] / "gauges/tube.csv")
     dt = np.diff(gauge["time [s]"])
     for axis in "xy":
@@ -136,7 +136,7 @@ def test_the_force_on_a_body_is_its_rate_of_momentum(tubes):
         assert np.isnan(force[0]) and momentum[0] == 0.0
         scale = np.abs(gauge["momentum_x [N s]"]).max()
         assert np.abs(np.diff(momentum) - force[1:] * dt).max() < 1e-9 * scale
-    moved = np.cumsum(gauge["velocity_x [m/s]"][1:] * dt)
+    moved = np.cumsum(gauge["velocity_x [m/s]"][:-1] * dt)
     assert gauge["displacement_x [m]"][1:] == pytest.approx(moved, rel=1e-6, abs=1e-12)
     assert moved[-1] > 0.0
 
