@@ -45,12 +45,13 @@ def concrete_pressure(mu, peak, wear, concrete):
 
 
 def concrete_strength(pressure, rate, wear, concrete):
-    """Von Mises stress [Pa] at yield (A.8, A.9 with the cap); falls to zero at the largest tension."""
+    """Von Mises stress [Pa] at yield (A.8, A.9 with the cap); falls to zero at the largest tension, or is the cap in
+    tension where cracks limit it."""
     fc, tensile_strength, A, B, N, C, cap = tuple(concrete[k] for k in static_range(8, 15))
     cut_off = concrete[19] * (1.0 - wear) if wear < 1.0 else 0.0
     faster = 1.0 + C * log(max(rate / concrete[18], 1.0))
     cohesion = A * (1.0 - wear)
-    pulled = cohesion * max(1.0 + pressure / max(cut_off, 1.0), 0.0)
+    pulled = cohesion * max(1.0 + pressure / max(cut_off, 1.0), 0.0) if concrete[19] < 1e300 else cap
     pressed = cohesion + B * pow(max(pressure, 0.0) / fc, N)
     return fc * min((pressed if pressure > 0.0 else pulled) * faster, cap)
 
