@@ -55,6 +55,7 @@ def von_mises(S):
 # ---- plastic flow ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_cycle_of_shear_follows_the_independent_integration():
     """Forth, back and forth again at 1e4/s: rate form of Johnson-Cook with heating, integrated by scipy."""
     point, rate, dt = Point(STEEL_EOS, STEEL), 1e4, 2e-9
