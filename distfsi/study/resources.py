@@ -18,7 +18,8 @@ from distfsi.simulation import deal_blocks
 from distfsi.study.works import SMOOTHING
 
 PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
-PICTURE_BYTES = 40e6  # of the maps in the summary
+PICTURE_BYTES = 25e6  # of the maps of a fluid in the summary
+COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {1: 900.0, 2: 1060.0, 3: 1280.0}  # at the peak within a step, by dimensions
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
 PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
@@ -80,8 +81,9 @@ class Resources:
 
     def memory(self) -> float:
         """Of the rank that takes most, at its peak."""
-        picture = PICTURE_BYTES if self.dimensions > 1 else 0.0
-        return PROCESS_BYTES + picture + self.arrays()
+        picture = PICTURE_BYTES if self.scene.fluid and self.dimensions > 1 else 0.0
+        coupling = COUPLING_BYTES * self.dimensions if self.scene.fluid and self.scene.solid else 0.0
+        return PROCESS_BYTES + picture + coupling + self.arrays()
 
     def arrays(self) -> float:
         """Cells and particles of the rank that takes most."""
