@@ -34,12 +34,19 @@ def advised(scene):
 # ---- the report ------------------------------------------------------------------------------------------------------
 
 
+ADVICE = {  # on purpose
+    "cavitation": "phase 'air' fills no cell",  # only traces of it, from which the bubbles grow
+    "thin_plate": "thinner than sqrt(2) cells",
+}
+
+
 @pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
 def test_every_example_gets_a_report_without_advice(path):
     scene = load(path)
     text = report(scene)
     assert text.startswith(scene.title)
-    assert advised(scene) == []
+    known = ADVICE.get(path.stem, "")
+    assert [text for text in advised(scene) if not known or known not in text] == []
     for name in ("domain", "blocks", "memory", "output", "steps", "time"):
         assert f"\n  {name} " in text
     assert "python -m distfsi bench" in text

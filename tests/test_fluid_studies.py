@@ -80,6 +80,7 @@ def test_points_are_drawn(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.full
 def test_frontier(tmp_path, monkeypatch, capsys):
     """Every problem has a front, finer is better, and first order is worse than the default in every problem."""
     monkeypatch.setattr(frontier_fluid, "DIRECTORY", tmp_path)

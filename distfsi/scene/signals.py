@@ -205,9 +205,11 @@ def solid_sound(body: Body) -> float:
 def solid_rate(scene: Scene, body: Body) -> float:
     """1/dt [1/s] of a body's particles (Monaghan's condition, safety 0.3), compressed by the fastest impact.
 
-    Behind a shock of particle velocity u and speed U = c0 + s1 u: sound speed c0 + (2 s1 - 1) u, volume 1 - u/U.
+    Behind a shock of particle velocity u and speed U = c0 + s1 u: sound speed c0 + (2 s1 - 1) u, volume 1 - u/U. With
+    bonds only a shock is viscous, not all there is.
     """
     solid, c = scene.solid, solid_sound(body)
+    alpha = solid.viscosity_alpha if solid.form == "updated_lagrangian" else 0.0
     closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
     u = 0.5 * max(closing)
     compression = 1.0
@@ -215,4 +217,4 @@ def solid_rate(scene: Scene, body: Body) -> float:
         compression = 1.0 - u / (body.eos.c0 + body.eos.s1 * u)
         c += (2.0 * body.eos.s1 - 1.0) * u
     h = solid.smoothing * body.spacing * max(compression, 0.1) ** (1.0 / scene.domain.dimensions)
-    return c * (1.0 + 0.6 * solid.viscosity_alpha) / (0.3 * h)
+    return c * (1.0 + 0.6 * alpha) / (0.3 * h)
