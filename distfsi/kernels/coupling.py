@@ -206,9 +206,8 @@ def fill_deep(begin, end, deep, U, shape, rest):
 
 
 @helper
-def add_flux(passed, n, U, at, cells, steps, rates, axis, weight, P, T, F):
-    """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`, by the rows of the
-    stage. rates (D,): dt/h per axis.
+def look_at_face(U, at, cells, steps, axis, P, T):
+    """P, T = primitives and slopes around the face between a cell `at` and the next along `axis`, by the stage's rows.
 
     P holds five lines of four cells: the one through the face, and those beside it if the flux looks there.
     """
@@ -222,7 +221,19 @@ def add_flux(passed, n, U, at, cells, steps, rates, axis, weight, P, T, F):
                 primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
                 primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
     slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
+
+
+@helper
+def flux_of_face(P, T, F, rates, axis):
+    """F = flux through the face that was looked at, by the rows of the stage. rates (D,): dt/h per axis."""
     face_fluxes(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, real(2 * DIMENSIONS) * rates[axis], 1, 1)
+
+
+@helper
+def add_flux(passed, n, U, at, cells, steps, rates, axis, weight, P, T, F):
+    """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`."""
+    look_at_face(U, at, cells, steps, axis, P, T)
+    flux_of_face(P, T, F, rates, axis)
     for v in range(PHASES + DIMENSIONS + 1):
         passed[n, v] += weight * load(F, 2 * place(v, axis))
 

@@ -5,13 +5,13 @@ is whole, so that both are the same. `swept` (blocks, SWEPT, Z, Y, X) holds v an
 phase energies. Cells are named as in kernels/coupling.py.
 """
 
-from distfsi.device.markers import driver, helper, load, real, store, workspace
-from distfsi.kernels.coupling import BOX, FLUID, LINE, add_flux
+from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.kernels.coupling import BOX, FLUID, add_flux, flux_of_face, look_at_face
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening
-from distfsi.kernels.fluid import face_fluxes, place, primitives_row, slopes_row
+from distfsi.kernels.fluid import place
 from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
+from distfsi.physics.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, primitives
 from distfsi.physics.tensors import dot
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
@@ -184,28 +184,19 @@ def open_between(kind, old, new, at, axis, step, cells):
 
 @helper
 def flux_beside_wall(U, kind, old, new, at, cells, steps, rates, axis, P, T, F):
-    """F = flux through the face between a cell and the next along `axis`, by the rows of the stage.
+    """F = flux through the face between a cell and the next along `axis`; returns the open part of the face.
 
-    rates (D,): dt/h per axis. P holds five lines of four cells: the one through the face, and those beside it if the
-    flux looks there. The slope of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
+    The slope of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
     """
-    first, step = at + at // cells * (VARIABLES - 1) * cells, steps[axis]
-    for c in range(4):
-        primitives_row(U, P, first + (c - 1) * step, cells, LINE + c, BOX, 1)
-    if LOOKS_SIDEWAYS:
-        for d in range(1, DIMENSIONS):
-            beside = steps[(axis + d) % DIMENSIONS]
-            for c in range(1, 3):
-                primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
-                primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
-    slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
+    step = steps[axis]
+    look_at_face(U, at, cells, steps, axis, P, T)
     between = open_between(kind, old, new, at + step, axis, step, cells)
     for c in range(2):
         beyond = open_between(kind, old, new, at + 2 * c * step, axis, step, cells)
         if not (between > 0.0 and beyond > 0.0):
             for v in range(VARIABLES):
                 T[2 * v + c] = 0.0
-    face_fluxes(P, T, F, LINE + 1, BOX, 1, 4, 8, 0, 1, 2, 0, axis, real(2 * DIMENSIONS) * rates[axis], 1, 1)
+    flux_of_face(P, T, F, rates, axis)
     return between
 
 

@@ -58,29 +58,9 @@ def spin_of(rates, stretch, i, dt):
 
 @driver
 def deform(
-    begin,
-    end,
-    dt,
-    gradient,
-    body,
-    eos,
-    strength,
-    failure,
-    concrete,
-    energy,
-    density,
-    h,
-    deviator,
-    plastic_strain,
-    temperature,
-    pressure,
-    sound_speed,
-    damage,
-    wear,
-    toughness,
-    compression,
-    stretch,
-):
+    begin, end, dt, gradient, body, eos, strength, failure, concrete, energy, density, h, deviator, plastic_strain,
+    temperature, pressure, sound_speed, damage, wear, toughness, compression, stretch,
+):  # fmt: skip
     """Advance density, smoothing length and all that a material remembers by `dt` of the velocity gradient.
 
     `eos`, `strength`, `failure` and `concrete` hold one row of constants per body. `deviator` and `pressure` are what
@@ -94,61 +74,20 @@ def deform(
         spin = spin_of(rates, stretch, i, dt)
         before = intact_deviator(deviator, pressure, damage, concrete, own, i)
         stress = trial_deviator(before, rates, spin, metal[0], dt)
-        p, scale = 0.0, 1.0
+        p, scale, is_concrete = 0.0, 1.0, False
         if CONCRETE:
-            if concrete[own, COMPRESSIVE_STRENGTH] > 0.0:
+            is_concrete = concrete[own, COMPRESSIVE_STRENGTH] > 0.0
+            if is_concrete:
                 rate = 2.0 / 3.0 * von_mises(stretching(rates))
                 p, scale = crush(
-                    i,
-                    own,
-                    rate,
-                    stress,
-                    law,
-                    metal[0],
-                    concrete,
-                    density,
-                    plastic_strain,
-                    sound_speed,
-                    damage,
-                    wear,
+                    i, own, rate, stress, law, metal[0], concrete, density, plastic_strain, sound_speed, damage, wear,
                     compression,
-                )
-            else:
-                p, scale = flow(
-                    i,
-                    own,
-                    dt,
-                    stress,
-                    law,
-                    metal,
-                    failure,
-                    energy,
-                    density,
-                    plastic_strain,
-                    temperature,
-                    sound_speed,
-                    damage,
-                    wear,
-                    toughness,
-                )
-        else:
+                )  # fmt: skip
+        if not is_concrete:
             p, scale = flow(
-                i,
-                own,
-                dt,
-                stress,
-                law,
-                metal,
-                failure,
-                energy,
-                density,
-                plastic_strain,
-                temperature,
-                sound_speed,
-                damage,
-                wear,
-                toughness,
-            )
+                i, own, dt, stress, law, metal, failure, energy, density, plastic_strain, temperature, sound_speed,
+                damage, wear, toughness,
+            )  # fmt: skip
         carry(i, own, p, scale, stress, law, metal[0], failure, concrete, deviator, pressure, damage, toughness)
 
 
