@@ -7,7 +7,7 @@ phase energies. Cells are named as in kernels/coupling.py.
 
 from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.kernels.coupling import BOX, FLUID, add_flux, flux_of_face, look_at_face
-from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening
+from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening, step_to
 from distfsi.kernels.fluid import place
 from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
 from distfsi.physics.subset import static_range
@@ -135,9 +135,7 @@ def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, sha
         index = index_of(center, shape, origin)
         for m in range(len(offsets)):
             if is_in_domain(index, offsets[m], grid_cells):
-                step = 0
-                for d in static_range(DIMENSIONS):
-                    step += offsets[m, d] * steps[d]
+                step = step_to(offsets, m, steps)
                 way = way_to_master(master, center + step, cells, steps)
                 if way != 0 and way == -step:
                     joined = True

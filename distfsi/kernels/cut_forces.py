@@ -7,7 +7,7 @@ momentum and work arrive as they leave.
 from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.kernels.coupling import center_of
 from distfsi.kernels.cut_cells import index_of, share_at, way_to_master
-from distfsi.kernels.cut_geometry import is_in_domain
+from distfsi.kernels.cut_geometry import is_in_domain, step_to
 from distfsi.kernels.gather import sum_particles
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
@@ -75,9 +75,7 @@ def pay_debts(begin, end, band, paid, debt, U, swept, master, offsets, steps, sh
             index = index_of(at, shape, origin)
             for m in range(len(offsets)):
                 if is_in_domain(index, offsets[m], grid_cells):
-                    step = 0
-                    for d in static_range(DIMENSIONS):
-                        step += offsets[m, d] * steps[d]
+                    step = step_to(offsets, m, steps)
                     way = way_to_master(master, at + step, cells, steps)
                     if way != 0 and way == -step:
                         owed += load(debt, at + step)

@@ -239,6 +239,12 @@ def slope_of_fraction(old, new, at, step):
     return (load(old, at + step) + load(new, at + step)) - (load(old, at - step) + load(new, at - step))
 
 
+@helper
+def step_to(offsets, m, steps):
+    """How far away in memory the neighbour number m is."""
+    return sum(offsets[m, d] * steps[d] for d in static_range(DIMENSIONS))
+
+
 @driver
 def find_masters(
     begin, end, near, kind, master, fraction_old, fraction_new, swept, fields, aperture_old, aperture_new, offsets,
@@ -273,9 +279,7 @@ def find_masters(
                     for m in range(len(offsets)):
                         if not is_in_domain(index, offsets[m], grid_cells):
                             continue
-                        step = 0
-                        for d in static_range(DIMENSIONS):
-                            step += offsets[m, d] * steps[d]
+                        step = step_to(offsets, m, steps)
                         if is_needy(fraction_old, fraction_new, swept, at + step, share + step):
                             continue
                         away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
@@ -345,9 +349,7 @@ def needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, step
     whole = is_whole(kind, fraction_old, fraction_new, swept, at, share)
     for m in range(len(offsets)):
         if whole:
-            step = 0
-            for d in static_range(DIMENSIONS):
-                step += offsets[m, d] * steps[d]
+            step = step_to(offsets, m, steps)
             whole = is_whole(kind, fraction_old, fraction_new, swept, at + step, share + step)
     for d in static_range(DIMENSIONS):
         for side in range(-2, 3, 4):
