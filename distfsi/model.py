@@ -118,6 +118,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme == "cut_cells",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}

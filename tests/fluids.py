@@ -22,4 +22,5 @@ def model_of(
     phases = tuple(Phase(name, MATERIALS[name]) for name in names)
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
     domain = SimpleNamespace(dimensions=dimensions)
-    return fluid_model(SimpleNamespace(fluid=fluid, domain=domain, gravity=gravity or (0.0,) * dimensions))
+    gravity = gravity or (0.0,) * dimensions
+    return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, gravity=gravity))

@@ -149,14 +149,14 @@ def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, sha
 
 
 @driver
-def put_mixed(begin, end, band, mixed, U, swept, shape):
-    """Store the states and volumes of the band."""
+def put_mixed(begin, end, chosen, mixed, U, swept, shape):
+    """Store the states and volumes of the cells `chosen`."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
-        first = band[n] + band[n] // cells * (VARIABLES - 1) * cells
+        first = chosen[n] + chosen[n] // cells * (VARIABLES - 1) * cells
         for v in static_range(VARIABLES):
             store(U, first + v * cells, mixed[n, v])
-        store(swept, share_at(band[n], cells), mixed[n, VARIABLES])
+        store(swept, share_at(chosen[n], cells), mixed[n, VARIABLES])
 
 
 @driver
@@ -308,14 +308,14 @@ def opposite(kind, swept, fraction, old, new, at, sign, cells, steps, index, gri
 
 @driver
 def exchange_volumes(
-    begin, end, band, mixed, U, swept, kind, fraction, old, new, steps, shape, origin, grid_cells
+    begin, end, uneven, mixed, U, swept, kind, fraction, old, new, steps, shape, origin, grid_cells
 ):  # fmt: skip
-    """mixed (n, VARIABLES + 1) = state and volume of the band's cells after those with too much have given to their
-    neighbours with too little, with the content that belongs to it."""
+    """mixed (n, VARIABLES + 1) = state and volume of cells, among them all with too much or too little, after those
+    with too much have given to their neighbours with too little, with the content that belongs to it."""
     cells = shape[0] * shape[1] * shape[2]
     total = workspace(VARIABLES)
     for n in range(begin, end):
-        at = band[n]
+        at = uneven[n]
         volume = load(swept, share_at(at, cells))
         state = state_at(U, at, cells)
         for v in static_range(VARIABLES):

@@ -1,5 +1,5 @@
 """Loops of the cut cells' geometry: signed distances at the corners of cells, what they leave open of faces and cells,
-which cells join which, and the lists of cells that are not whole.
+and which cells join which.
 
 Particles are smoothed with a kernel; inverting its plane profile turns the sum at a corner into a distance that is
 linear in the positions of the particles. Where a body is thinner than the diagonal of a cell its particles count as
@@ -331,77 +331,3 @@ def find_refuges(
                                     most = part
                                     for d in range(DIMENSIONS):
                                         master[first + d * cells] = way if d == axis else 0
-
-
-# ---- lists ----------------------------------------------------------------------------------------------------------
-
-
-@helper
-def is_whole(kind, fraction_old, fraction_new, swept, at, share):
-    """Whether a cell is like any other of the fluid, throughout the step."""
-    whole = smaller(fraction_old, fraction_new, at) == 1.0
-    return whole and load(swept, share) == 1.0 and kind[at] == FLUID
-
-
-@helper
-def needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
-    """Whether the fluid stage alone does not do for a cell: something it reads is not whole."""
-    whole = is_whole(kind, fraction_old, fraction_new, swept, at, share)
-    for m in range(len(offsets)):
-        if whole:
-            step = step_to(offsets, m, steps)
-            whole = is_whole(kind, fraction_old, fraction_new, swept, at + step, share + step)
-    for d in static_range(DIMENSIONS):
-        for side in range(-2, 3, 4):
-            if whole:
-                step = side * steps[d]
-                whole = is_whole(kind, fraction_old, fraction_new, swept, at + step, share + step)
-    return not whole
-
-
-@driver
-def sort_cells(
-    begin, end, near, kind, fraction_old, fraction_new, swept, fields, offsets, steps, shape, extent, counts
-):  # fmt: skip
-    """counts (blocks, 2) = cells in the band around the wall, and covered ones; a block without them is not near."""
-    cells = shape[0] * shape[1] * shape[2]
-    for b in range(begin, end):
-        counts[b, 0] = 0
-        counts[b, 1] = 0
-        if near[b] == 0:
-            continue
-        for k in range(extent[b, 2]):
-            for j in range(extent[b, 1]):
-                for i in range(extent[b, 0]):
-                    at = cell_at(b, i, j, k, shape)
-                    share = at + b * (fields - 1) * cells
-                    if kind[at] == COVERED:
-                        counts[b, 1] += 1
-                    elif needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
-                        counts[b, 0] += 1
-        if near[b] != CUT and counts[b, 0] + counts[b, 1] == 0:
-            near[b] = 0
-
-
-@driver
-def list_band(
-    begin, end, near, kind, fraction_old, fraction_new, swept, fields, offsets, steps, shape, extent, first, band,
-    covered,
-):  # fmt: skip
-    """Write the cells of the band and the covered ones, block by block, from the places first (blocks, 2) on."""
-    cells = shape[0] * shape[1] * shape[2]
-    for b in range(begin, end):
-        if near[b] == 0:
-            continue
-        n, m = first[b, 0], first[b, 1]
-        for k in range(extent[b, 2]):
-            for j in range(extent[b, 1]):
-                for i in range(extent[b, 0]):
-                    at = cell_at(b, i, j, k, shape)
-                    share = at + b * (fields - 1) * cells
-                    if kind[at] == COVERED:
-                        covered[m] = at
-                        m += 1
-                    elif needs_care(kind, fraction_old, fraction_new, swept, at, share, offsets, steps):
-                        band[n] = at
-                        n += 1

@@ -47,6 +47,7 @@ constexpr int SP = SLOTS * PLANE;
 constexpr int ROW = TILE_X + 1;  // of faces
 constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
 constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
+constexpr real LEAST_VOLUME = HALF;
 static_assert(SHARED == VARIABLES * SP + FLUXES * FACES && THREADS == TILE_X * TILE_Y, "what the launch assumes");
 
 // P of a cell of the tile; k counts planes, of which the last SLOTS are there.
@@ -239,6 +240,12 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             real before[VARIABLES], now[VARIABLES];
 #pragma unroll
             for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
+            if constexpr (FRACTIONAL) {
+                const real volume = volumes[u - tile[BLOCK] * (VARIABLES - volumes_1) * su];
+                const real concentration = 1 / maximum(volume, LEAST_VOLUME);
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) D[v] = D[v] * concentration;
+            }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
             const auto divergence = tuple_of<FLUXES>(D);
             put(updated(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt), U_new + u, su);

@@ -19,6 +19,7 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
     FLUXES,
+    FRACTIONAL,
     LOOKS_SIDEWAYS,
     PHASES,
     VARIABLES,
@@ -35,6 +36,8 @@ from distfsi.physics.symbols import (
 # columns of the tile table: the block, the first cell (counted with ghosts), the cells, which domain sides the tile
 # touches (bits)
 BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES = 0, 1, 2, 3, 4, 5, 6, 7
+
+LEAST_VOLUME = 0.5  # of a cell: what has less is not the stage's to advance (kernels/band.py)
 
 
 @helper
@@ -169,16 +172,22 @@ def divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz):
 
 
 @row
-def update_row(U_n, U, P, F, U_new, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz, b, dt, n):
-    """U_new = one Runge-Kutta stage of the n cells at U[u …]."""
+def update_row(
+    U_n, U, P, F, V, U_new, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz, b, dt, n
+):  # fmt: skip
+    """U_new = one Runge-Kutta stage of the n cells at U[u …]; V[s …]: their volumes of fluid if it is FRACTIONAL."""
     for i in range(n):
+        D = tuple(
+            divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz) for v in static_range(FLUXES)
+        )
+        if FRACTIONAL:
+            concentration = 1.0 / max(load(V, s + i), LEAST_VOLUME)
+            D = tuple(D[v] * concentration for v in static_range(FLUXES))
         new = updated(
             tuple(load(U_n, u + v * su + i) for v in static_range(VARIABLES)),
             tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)),
             tuple(load(P, p + v * sp + i) for v in static_range(VARIABLES)),
-            tuple(
-                divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz) for v in static_range(FLUXES)
-            ),
+            D,
             b,
             dt,
         )
@@ -256,13 +265,15 @@ def stage_block(constants, arguments):
 @ByHand("fluid.cu", STAGE_FORMULAS, stage_block)
 @driver
 def advance_tiles(
-    begin, end, chosen, tiles, calm, stages, U_n, U, U_new, through, limited, b, dt, weight, cx, cy, cz, px, py, pz
+    begin, end, chosen, tiles, calm, stages, U_n, U, U_new, volumes, through, limited, b, dt, weight, cx, cy, cz,
+    px, py, pz,
 ):  # fmt: skip
     """One Runge-Kutta stage of the tiles chosen[begin:end].
 
     calm (tiles,): which tiles are known to stay as they are, in U_new too; only their flux is booked.
     stages (tiles + 1,): for how many stages each tile has not changed; counted here.
     U_n, U, U_new: (blocks, VARIABLES, Z, Y, X), the state before the step, of this stage and after it; U_n may be U.
+    volumes (blocks, k, Z, Y, X): their first field are those of the cells' fluid, if it is FRACTIONAL.
     through (tiles, 6, conserved): grows by weight * dt/h * flux at the domain's sides. limited (tiles,): grows by the
     faces at the low sides of the tile's cells whose flux was limited. cx, cy, cz: dt/h per axis.
     """
@@ -282,6 +293,7 @@ def advance_tiles(
         t = chosen[at]
         nx, ny, nz, sides = tiles[t, NX], tiles[t, NY], tiles[t, NZ], tiles[t, SIDES]
         u0 = tiles[t, BLOCK] * VARIABLES * su + tiles[t, Z0] * sz + tiles[t, Y0] * sy + tiles[t, X0]
+        v0 = u0 - tiles[t, BLOCK] * (VARIABLES - volumes.shape[1]) * su
         uniform = calm[t] or (
             is_uniform(U, u0 - gz * sz - gy * sy - 2, su, sz, sy, nx + 4, ny + 2 * gy, nz + 2 * gz)
             and is_uniform(U_n, u0, su, sz, sy, nx, ny, nz)
@@ -331,8 +343,9 @@ def advance_tiles(
                 u = u0 + k * sz + j * sy
                 fz_low, fz_high = (now + j) * fluxes, (then + j) * fluxes
                 update_row(
-                    U_n, U, P, F, U_new, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high, cx, cy, cz, b, dt, n
-                )
+                    U_n, U, P, F, volumes, U_new, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high,
+                    v0 + k * sz + j * sy, cx, cy, cz, b, dt, n,
+                )  # fmt: skip
                 if sides & 1:
                     book(through, t, 0, F, fx, step, px, 0, 1, x_alike, weight * cx)
                 if sides & 2:

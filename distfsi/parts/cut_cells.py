@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_forces
@@ -70,6 +70,7 @@ class CutCells:
 
         self.kind = blocks.allocate(1, np.uint8)
         self.swept = np.ones((blocks.local_count, 3 if model.phases == 2 else 1, *blocks.shape), real)
+        fluid.volumes = Pair(team, self.swept)
         self._master = blocks.allocate(grid.dimensions, np.int8)
         self._kick, self._debt = blocks.allocate(grid.dimensions), blocks.allocate(1)
         self._band = np.empty(0, dtype=np.int64)
@@ -166,15 +167,19 @@ class CutCells:
         """Mix what the last stage left, and exchange volumes so that they stay near the geometric ones."""
         U, after = self.fluid.state, self.wall.parts[1]
         self._mix(U, after)
-        mixed = np.empty((len(self._band), self.model.variables + 1), U.dtype)
+        uneven = np.concatenate([self._band, self._loose])
+        mixed = np.empty((len(uneven), self.model.variables + 1), U.dtype)
         for _ in range(2):
             self._exchange_state(U)
             self._exchange_swept()
-            self._run(
-                self.fluid_kernels.exchange_volumes, mixed, U, self.swept.reshape(-1), self.kind.reshape(-1), after,
-                *self.wall.faces, self.wall.steps, self.wall.shape, self.blocks.origin, self.wall.cells,
+            self.team.run(
+                self.fluid_kernels.exchange_volumes, len(uneven), uneven, mixed, U, self.swept.reshape(-1),
+                self.kind.reshape(-1), after, *self.wall.faces, self.wall.steps, self.wall.shape, self.blocks.origin,
+                self.wall.cells,
             )  # fmt: skip
-            self._run(self.fluid_kernels.put_mixed, mixed, U, self.swept.reshape(-1), self.wall.shape)
+            self.team.run(
+                self.fluid_kernels.put_mixed, len(uneven), uneven, mixed, U, self.swept.reshape(-1), self.wall.shape
+            )  # fmt: skip
         self._exchange_swept()
 
     def impulse(self) -> np.ndarray:
@@ -244,12 +249,12 @@ class CutCells:
         return np.clip(0.5 + depth / side, 0.0, 1.0).prod(axis=1)
 
     def _find_company(self) -> None:
-        """Which cells join which, and the lists of the band's and the covered cells."""
+        """Which cells join which, and the lists of the band's, the covered and the loose cells."""
         self.wall.find_masters(self.kind, self._master, self.swept)
         self._exchange(self.kind, np.array([-1]), immersed_kernels.FLUID)
         self.wall.find_refuges(self.kind, self._master)
         self._exchange(self._master, np.arange(self._dimensions), 0)
-        self._band, self._covered = self.wall.lists(self.kind, self.swept)
+        self._band, self._covered, self._loose = self.wall.lists(self.kind, self.swept)
         self._evict()
 
     def _evict(self) -> None:
@@ -267,7 +272,7 @@ class CutCells:
         left = (self.kind == SHUT) & (self._master != 0).any(axis=1, keepdims=True)
         self.kind[left] = immersed_kernels.COVERED
         self._master[np.broadcast_to(left, self._master.shape)] = 0
-        self._band, self._covered = self.wall.lists(self.kind, self.swept)
+        self._band, self._covered, self._loose = self.wall.lists(self.kind, self.swept)
 
     def _see(self, velocity: np.ndarray, mean: np.ndarray) -> None:
         """mean (band, D) of particles' velocities around the cells, where the particles were when the step began."""

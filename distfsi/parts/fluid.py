@@ -64,6 +64,7 @@ class Fluid:
         self._fastest = Pair(team, np.zeros(blocks.local_count))
         self._before = self._booked()
         self._signal: float | None = None
+        self.volumes = Pair(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
@@ -176,8 +177,8 @@ class Fluid:
         real = output.dtype.type
         self.team.run(
             self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
-            self._buffers[0].there, self.input_of(stage), output.there, self._through.there, self._limited.there,
-            real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
+            self._buffers[0].there, self.input_of(stage), output.there, self.volumes.there, self._through.there,
+            self._limited.there, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
         )  # fmt: skip
 
     def rates(self, dt: float) -> list:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import permutations, product
-from math import sqrt
+from math import prod, sqrt
 from types import SimpleNamespace
 
 import numpy as np
 
 from distfsi.device.seam import Device
+from distfsi.kernels import band
 from distfsi.kernels import cut_geometry as kernels
 from distfsi.kernels import solid as particle_kernels
 from distfsi.mesh.blocks import Blocks
@@ -27,8 +28,9 @@ DRIVERS = (
     kernels.open_up,
     kernels.find_masters,
     kernels.find_refuges,
-    kernels.sort_cells,
-    kernels.list_band,
+    band.find_whole,
+    band.find_band,
+    band.list_band,
 )
 
 
@@ -68,6 +70,7 @@ class WallGeometry:
         self.fractions = tuple(np.ones((blocks.local_count, 1, *blocks.shape), real) for _ in range(2))
         self.apertures = tuple(np.ones((blocks.local_count, D, *blocks.shape), real) for _ in range(2))
         self.near = np.ones(blocks.local_count, dtype=np.uint8)
+        self._whole, self._plain = blocks.allocate(1, np.uint8), blocks.allocate(1, np.uint8)
         corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
         self._distance = np.full((blocks.local_count, *corners), self.radius)
         self._profile = plane_profile(D)
@@ -157,14 +160,22 @@ class WallGeometry:
             self.parts[1], *self.faces, self.steps, self.shape, blocks.origin, blocks.extent, self.cells,
         )  # fmt: skip
 
-    def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cells of the band around the wall, and the covered ones, block by block."""
-        count = self.blocks.local_count
-        cells = (self.near, kind.reshape(-1), *self.parts, swept.reshape(-1), swept.shape[1])
-        place = (self.offsets, self.steps, self.shape, self.blocks.extent)
-        counts = np.zeros((count, 2), dtype=np.int64)
-        self.team.run(self.kernels.sort_cells, count, *cells, *place, counts)
+    def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The cells of the band around the wall, the covered and the loose ones (kernels/band.py); a block without them
+        is not near."""
+        near, extent, k = self.near, self.blocks.extent, self.kernels
+        whole, plain, kind = self._whole.reshape(-1), self._plain.reshape(-1), kind.reshape(-1)
+        share = (swept.reshape(-1), swept.shape[1])
+        blocks, rows = self.blocks.local_count, prod(self.blocks.shape[:2])
+        self.team.run(k.find_whole, blocks * rows, near, whole, kind, *self.parts, *share, self.shape)
+        counts = np.empty((blocks * rows, 3), dtype=np.int64)
+        self.team.run(
+            k.find_band, blocks * rows, near, plain, whole, kind, *share, self.offsets, self.steps, self.shape, extent,
+            counts,
+        )  # fmt: skip
+        in_blocks = counts.reshape(blocks, rows, 3).sum(axis=(1, 2))
+        near[(near != kernels.CUT) & (in_blocks == 0)] = 0
         first = np.cumsum(counts, axis=0) - counts
-        band, covered = (np.empty(n, dtype=np.int64) for n in counts.sum(axis=0))
-        self.team.run(self.kernels.list_band, count, *cells, *place, first, band, covered)
-        return band, covered
+        lists = tuple(np.empty(n, dtype=np.int64) for n in counts.sum(axis=0))
+        self.team.run(k.list_band, blocks * rows, near, plain, kind, *share, self.shape, extent, first, *lists)
+        return lists

@@ -37,6 +37,7 @@ OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega 
 OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
 CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
 
+FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
 LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")

@@ -110,7 +110,7 @@ class Resources:
         if self.scene.coupling.scheme == "paper":
             return paper
         swept = 3 if len(self.scene.fluid.phases) == 2 else 1
-        return paper + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
+        return paper + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
 
     # ---- files -------------------------------------------------------------------------------------------------------
 

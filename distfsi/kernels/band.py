@@ -1,0 +1,100 @@
+"""Loops that list the band, all cells that read one that is not whole, the covered cells, and the loose ones: whole
+cells that the wall has left, in which the volume that their fluid has swept is not quite theirs.
+
+An item is a row of cells along x. Rows are numbered as they lie in memory, ghosts included; cells are named as in
+kernels/coupling.py.
+"""
+
+from distfsi.device.markers import driver, helper, load, row, store
+from distfsi.kernels.coupling import COVERED, FLUID
+from distfsi.kernels.cut_geometry import step_to
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS
+
+NEAR_WHOLE = 0.25  # of a cell: the fluid's stage advances open cells whose swept volume is not farther off
+
+
+@row
+def whole_row(whole, kind, fraction_old, fraction_new, swept, at, share, n):
+    """whole[at …] = 1 where a cell is like any other of the fluid, throughout the step."""
+    for i in range(n):
+        old, new, volume = load(fraction_old, at + i), load(fraction_new, at + i), load(swept, share + i)
+        fluid, near = load(kind, at + i) == FLUID, abs(volume - 1.0) <= NEAR_WHOLE
+        store(whole, at + i, 1 if (old == 1.0) & (new == 1.0) & near & fluid else 0)
+
+
+@row
+def join_row(plain, whole, at, step, n):
+    """plain[at …] becomes 0 where the cell `step` away is not whole."""
+    for i in range(n):
+        store(plain, at + i, load(plain, at + i) & load(whole, at + step + i))
+
+
+@driver
+def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept, fields, shape):
+    """whole = 1 where a cell is like any other of the fluid, in `near` blocks. swept (blocks, fields, Z, Y, X)."""
+    cells = shape[0] * shape[1] * shape[2]
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        if near[b] > 0:
+            at = r * shape[2]
+            whole_row(whole, kind, fraction_old, fraction_new, swept, at, at + b * (fields - 1) * cells, shape[2])
+
+
+@helper
+def cells_of_row(r, b, shape, extent):
+    """How many active cells a row has."""
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    j, k = r % shape[1] - gy, r // shape[1] % shape[0] - gz
+    return extent[b, 0] if j >= 0 and j < extent[b, 1] and k >= 0 and k < extent[b, 2] else 0
+
+
+@driver
+def find_band(begin, end, near, plain, whole, kind, swept, fields, offsets, steps, shape, extent, counts):
+    """plain = 1 where all that the fluid's stage reads for a cell is whole; counts (rows, 3) = cells in the band,
+    covered and loose ones."""
+    cells = shape[0] * shape[1] * shape[2]
+    for r in range(begin, end):
+        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
+        n = cells_of_row(r, b, shape, extent) if near[b] > 0 else 0
+        if n > 0:
+            for i in range(n):
+                store(plain, at + i, load(whole, at + i))
+            for m in range(len(offsets)):
+                join_row(plain, whole, at, step_to(offsets, m, steps), n)
+            for d in static_range(DIMENSIONS):
+                join_row(plain, whole, at, -2 * steps[d], n)
+                join_row(plain, whole, at, 2 * steps[d], n)
+        share = at + b * (fields - 1) * cells
+        band, covered, loose = 0, 0, 0
+        for i in range(n):
+            if kind[at + i] == COVERED:
+                covered += 1
+            elif plain[at + i] == 0:
+                band += 1
+            elif load(swept, share + i) != 1.0:
+                loose += 1
+        counts[r, 0] = band
+        counts[r, 1] = covered
+        counts[r, 2] = loose
+
+
+@driver
+def list_band(begin, end, near, plain, kind, swept, fields, shape, extent, first, band, covered, loose):
+    """Write the cells of the band, the covered and the loose ones, row by row, from the places first (rows, 3) on."""
+    cells = shape[0] * shape[1] * shape[2]
+    for r in range(begin, end):
+        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
+        share = at + b * (fields - 1) * cells
+        n, m, l = first[r, 0], first[r, 1], first[r, 2]
+        for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
+            if kind[at + i] == COVERED:
+                covered[m] = at + i
+                m += 1
+            elif plain[at + i] == 0:
+                band[n] = at + i
+                n += 1
+            elif load(swept, share + i) != 1.0:
+                loose[l] = at + i
+                l += 1
