@@ -211,8 +211,8 @@ RATES = {
     "shock_bubble_2d_float32": {"cell_stages_per_second": 3e7},
     **{f"{name}_2d": {"cell_stages_per_second": 6e6} for name in ("water_air", "tnt_air", "euler")},
     **{f"copper_block_{d}d": {"particle_steps_per_second": 1e6} for d in (1, 2, 3)},
-    "blast_on_copper_2d": {"cells": 1000, "particles": 1000, "particle_steps_per_second": 4e5},
-    "blast_on_copper_3d": {"cells": 1000, "particles": 1000, "particle_steps_per_second": 1e5},
+    **{f"blast_on_copper_{d}d": {"band_cells": 10, "particles": 1000, "wall_seconds_per_step": 1e-3} for d in (2, 3)},
+    **{f"blast_on_plate_{d}d": {"band_cells": 100, "particles": 100, "wall_seconds_per_step": 1e-3} for d in (2, 3)},
 }
 
 
@@ -229,9 +229,9 @@ def test_the_time_is_start_and_steps_and_files():
     assert four - 1e-3 == pytest.approx((one - 1e-3) / 4)
     tube = Resources(load(TUBE), 1)
     moving, neighbours = moving_share(tube.scene, tube.layout), (tube.scene.solid.smoothing / 1.3) ** 2
-    coupled = (
-        1e-3 + moving * 3 * tube.cells / 6e6 + tube.particles * (neighbours + 1.5 - 3 / 6) * 1e-6 + tube.cells * 1e-8
-    )
+    per_cell, per_particle = np.linalg.solve([[10, 1000], [100, 100]], [1e-3, 1e-3])
+    wall = tube.band_cells * per_cell + tube.particles * per_particle
+    coupled = 1e-3 + moving * 3 * tube.cells / 6e6 + tube.particles * neighbours * 1e-6 + wall + tube.cells * 1e-8
     assert seconds(TUBE, 1, 1) == pytest.approx(coupled)
     assert seconds(bubble, 1, 1, "time.maximum_steps=10", whole) < 0.5 * one  # most of the air is still at rest
     assert "on 2 rank(s) of 1 thread(s), by the bench of this machine" in report(tube.scene, 2, 1, RATES)

@@ -155,7 +155,7 @@ class CutCells:
             self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
             stage.b, dt, weight,
         )  # fmt: skip
-        near = np.flatnonzero(self.wall.near[self._side_blocks])
+        near = np.flatnonzero(self.wall.is_band(self._side_cells))
         self.team.run(
             self.fluid_kernels.book_sides, len(near), near, self._side_cells, self._side, self._through_sides,
             self._input, *self._walls, rates, weight * self._cell_volume / self._spacing,

@@ -160,6 +160,11 @@ class WallGeometry:
             self.parts[1], *self.faces, self.steps, self.shape, blocks.origin, blocks.extent, self.cells,
         )  # fmt: skip
 
+    def is_band(self, cells: np.ndarray) -> np.ndarray:
+        """Which of these cells, numbered as they lie in memory, are in the band or covered."""
+        blocks = cells // int(self.shape.prod())
+        return (self.near[blocks] > 0) & (self._plain.reshape(-1)[cells] == 0)
+
     def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The cells of the band around the wall, the covered and the loose ones (kernels/band.py); a block without them
         is not near."""

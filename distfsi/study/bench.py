@@ -99,6 +99,22 @@ def stir(fluid: Fluid) -> None:
     cells[:, : fluid.model.conserved] *= (1.0 + 1e-6 * noise).astype(cells.dtype)
 
 
+def time_parts(simulation: Simulation) -> Result:
+    """What each part's kernels take of a step of fluid and solid together, and how many cells are around the wall."""
+    gather, parts = (
+        simulation.communicator.allgather,
+        dict(zip(("fluid", "solid", "wall"), simulation.parts, strict=True)),
+    )
+    before = {name: part.team.seconds for name, part in parts.items()}
+    for _ in range(REPEATS):
+        simulation.step()
+    spent = {name: max(gather(part.team.seconds - before[name])) / REPEATS for name, part in parts.items()}
+    return {
+        "cells": int(np.prod(simulation.scene.domain.cells)),
+        "band_cells": sum(gather(int(simulation.coupling.workload().sum()))),
+    } | {f"{name}_seconds_per_step": seconds for name, seconds in spent.items()}
+
+
 def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
     """Speed of the time loop of one fluid, none of it at rest."""
     simulation = start(work, communicator, threads)
@@ -119,12 +135,12 @@ def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, se
 
 
 def bench_solid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
-    """Speed of the time loop of one solid, with a fluid around it or without."""
+    """Speed of the time loop of one solid, with a fluid around it or without; and what the wall between them costs."""
     simulation = start(work, communicator, threads)
     particles = sum(communicator.allgather(len(simulation.solid.columns["id"])))
     first, step = time_loop(simulation, seconds)
-    cells = {"cells": int(np.prod(work.domain.cells))} if work.fluid else {}
-    return cells | {
+    coupled = time_parts(simulation) if work.fluid else {}
+    return coupled | {
         "particles": particles,
         "particle_steps_per_second": particles / step,
         "first_step_seconds": first,

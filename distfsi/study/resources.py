@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import ndimage, optimize
 
 from distfsi.mesh.blocks import Blocks
 from distfsi.model import fluid_model
@@ -77,6 +78,23 @@ class Resources:
             counts += np.bincount(owners, minlength=self.ranks)
         return counts
 
+    @cached_property
+    def band_cells(self) -> int:
+        """Cells of the fluid around the wall at the start, about: at most two away from one with particles, except
+        those that have particles all around."""
+        if not (self.cells and self.particles):
+            return 0
+        D, domain = self.dimensions, self.scene.domain
+        spacing = (np.array(domain.upper) - domain.lower)[:D] / domain.cells[:D]
+        place = np.floor((np.concatenate(list(self.positions.values())) - domain.lower[:D]) / spacing).astype(int)
+        first = place.min(axis=0) - 2
+        occupied = np.zeros(place.max(axis=0) - first + 3, dtype=bool)
+        occupied[tuple((place - first).T)] = True
+        around = np.ones((3,) * D, dtype=bool)
+        band = ndimage.binary_dilation(occupied, around, 2) & ~ndimage.binary_erosion(occupied, around)
+        inside = tuple(slice(max(-low, 0), n - low) for low, n in zip(first, domain.cells, strict=False))
+        return int(np.count_nonzero(band[inside]))
+
     # ---- memory ------------------------------------------------------------------------------------------------------
 
     def memory(self) -> float:
@@ -145,6 +163,7 @@ class Resources:
         smallest = "coupled" if self.cells and self.particles else "fluid" if self.cells else "solid"
         fixed = bench[f"smallest_{smallest}"]
         work = moving * self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
+        work += self._seconds_at_wall(bench)
         files = self.output_times() * (SECONDS_PER_FILE + self.output_bytes() / BYTES_PER_SECOND)
         bubble = bench["shock_bubble_2d"]
         row = fixed["history_row_seconds"] + share * self.cells * bubble["history_row_seconds"] / bubble["cells"]
@@ -173,18 +192,20 @@ class Resources:
         return len(SSP_RK3) / rate
 
     def _seconds_per_particle(self, bench: dict) -> float:
-        """Of a time step, by the number of neighbours; in a fluid with what the coupling takes besides."""
+        """Of a time step, by the form of the solid and the number of neighbours."""
         if not self.particles:
             return 0.0
-        neighbours = (self.scene.solid.smoothing / SMOOTHING) ** self.dimensions
-        alone = neighbours / bench[f"copper_block_{self.dimensions}d"]["particle_steps_per_second"]
-        if not self.cells:
-            return alone
-        D = max(self.dimensions, 2)
-        both = bench[f"blast_on_copper_{D}d"]
-        stages = bench["tnt_air_2d"]["cell_stages_per_second"]
-        stages *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"]
-        stages /= bench["shock_bubble_2d"]["cell_stages_per_second"]
-        fluid = len(SSP_RK3) * both["cells"] / stages / both["particles"]
-        solid = 1.0 / bench[f"copper_block_{D}d"]["particle_steps_per_second"]
-        return alone + max(1.0 / both["particle_steps_per_second"] - fluid - solid, 0.0)
+        solid, D = self.scene.solid, self.dimensions
+        neighbours = (solid.smoothing / SMOOTHING) ** D
+        bonded = f"bonded_copper_block_{D}d"
+        block = bonded if solid.form == "total_lagrangian" and bonded in bench else f"copper_block_{D}d"
+        return neighbours / bench[block]["particle_steps_per_second"]
+
+    def _seconds_at_wall(self, bench: dict) -> float:
+        """Of a time step: what cells around the wall and particles cost in two benchmarks, a block and a plate."""
+        if not self.band_cells:
+            return 0.0
+        works = [bench[f"blast_on_{body}_{max(self.dimensions, 2)}d"] for body in ("copper", "plate")]
+        amounts = np.array([[work["band_cells"], work["particles"]] for work in works], dtype=float)
+        prices, _ = optimize.nnls(amounts, np.array([work["wall_seconds_per_step"] for work in works]))
+        return float(prices @ (self.band_cells, self.particles))

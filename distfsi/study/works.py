@@ -39,22 +39,24 @@ def copper(particles: int, dimensions: int, form: scene.SolidForm = "updated_lag
     domain = scene.Domain(
         (-0.5 * side,) * D, (1.5 * side,) * D, (max(4, particles),) * D, (("outflow", "outflow"),) * D
     )
-    return _endless(domain, None, _cube((0.0,) * D, side, form))
+    return _endless(domain, None, _cube((0.0,) * D, (side,) * D, form))
 
 
-def blast_on_copper(cells: int, dimensions: int) -> scene.Scene:
-    """Copper in the way of exploding TNT; the standard coupled work."""
-    D = dimensions
+def blast_on_copper(cells: int, dimensions: int, thickness: float | None = None) -> scene.Scene:
+    """Copper in the way of exploding TNT, a cube or a plate `thickness` cells thick; the standard coupled works."""
+    D, side = dimensions, 0.25 * cells
     blast = gases((cells,) * D, (TNT, AIR), BURNT_TNT, AMBIENT_AIR)
-    cube = _cube((0.75 * cells,) + (0.375 * cells,) * (D - 1), 0.25 * cells)
+    cube = _cube((0.75 * cells,) + (0.375 * cells,) * (D - 1), (thickness or side,) + (side,) * (D - 1))
     domain = scene.Domain(blast.domain.lower, blast.domain.upper, blast.domain.cells, (("outflow", "outflow"),) * D)
     return _endless(domain, blast.fluid, cube)
 
 
-def _cube(lower: tuple[float, ...], side: float, form: scene.SolidForm = "updated_lagrangian") -> scene.Solid:
+def _cube(
+    lower: tuple[float, ...], sides: tuple[float, ...], form: scene.SolidForm = "updated_lagrangian"
+) -> scene.Solid:
     """Copper with two particles per cell along each axis."""
     D = len(lower)
-    shape = scene.Box(lower, tuple(a + side for a in lower))
+    shape = scene.Box(lower, tuple(a + side for a, side in zip(lower, sides, strict=True)))
     velocity = (10.0,) + (0.0,) * (D - 1)
     body = scene.Body("cube", shape, 0.5, 8930.0, velocity, COPPER, COPPER_STRENGTH, None)
     return scene.Solid((body,), SMOOTHING, 1.0, 2.0, form=form)
@@ -89,7 +91,12 @@ SOLIDS = {
     "bonded_copper_block_2d": lambda: copper(128, 2, "total_lagrangian"),
     "bonded_copper_block_3d": lambda: copper(32, 3, "total_lagrangian"),
 }
-COUPLED = {"blast_on_copper_2d": lambda: blast_on_copper(256, 2), "blast_on_copper_3d": lambda: blast_on_copper(48, 3)}
+COUPLED = {
+    "blast_on_copper_2d": lambda: blast_on_copper(256, 2),
+    "blast_on_copper_3d": lambda: blast_on_copper(48, 3),
+    "blast_on_plate_2d": lambda: blast_on_copper(256, 2, 2.0),
+    "blast_on_plate_3d": lambda: blast_on_copper(48, 3, 2.0),
+}
 SMALLEST = {
     "fluid": lambda: gases((8, 8), *TWO_GASES),
     "solid": lambda: copper(8, 2),
