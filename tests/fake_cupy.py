@@ -99,13 +99,18 @@ def empty(shape, dtype):
     return Array(np.empty(shape, dtype))
 
 
+def zeros(shape, dtype):
+    assert Stream.current
+    return Array(np.zeros(shape, dtype))
+
+
 def install(monkeypatch, gpus=2):
     """Make `import cupy` and `import cupyx` find this."""
     device = lambda ordinal: SimpleNamespace(use=lambda: None, compute_capability="90", id=ordinal)  # noqa: E731
     properties = {"name": b"none", "major": 9, "minor": 0, "totalGlobalMem": 2**36}
     runtime = SimpleNamespace(getDeviceCount=lambda: gpus, getDeviceProperties=lambda ordinal: properties)
     cupy, cupyx = ModuleType("cupy"), ModuleType("cupyx")
-    cupy.ndarray, cupy.empty, cupy.RawModule = Array, empty, RawModule
+    cupy.ndarray, cupy.empty, cupy.zeros, cupy.RawModule = Array, empty, zeros, RawModule
     cupy.cuda = SimpleNamespace(Stream=Stream, Device=device, runtime=runtime)
     cupyx.empty_pinned = np.empty
     monkeypatch.setitem(sys.modules, "cupy", cupy)

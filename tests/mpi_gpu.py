@@ -1,4 +1,4 @@
-"""Run by test_gpu.py on 1 and 2 ranks: fluid scenes on the CPU and on CUDA C that the host runs, with the same bits."""
+"""Run by test_gpu.py on 1 and 2 ranks: fluids and solids on the CPU and on CUDA C on the host have the same bits."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene.description import Ball, FluidState, HalfSpace, Performance, Region
 from distfsi.simulation import Simulation
 from fluids import MATERIALS
+from mpi_solid import bursting_ball, colliding_discs, step
 from tubes import scene_of
 
 SCENES = {
@@ -24,6 +25,7 @@ SCENES = {
     "bubble, float32": (("air", "helium"), 2, {"precision": "float32"}),
 }
 STEPS = 4
+SOLIDS = {colliding_discs: (20, (True, False)), bursting_ball: (62, (True,))}  # steps, late or not
 
 
 def scene(names, dimensions, **method):
@@ -70,6 +72,17 @@ def result(name, device):
     return [*cells, *books, *again, np.array([messenger.too_early if messenger else 0])]
 
 
+def solid_result(case, steps, device):
+    """All columns, books and bounds of the time step after some steps of a solid."""
+    part, _ = case(device)
+    for _ in range(steps):
+        step(part)
+    part.prepare()
+    books = [*part.totals().values(), part.boundary_impulse(), np.array([part.gravity_work(), part.time_step()[0]])]
+    part.label_pieces()
+    return [*part.columns.values(), *map(np.atleast_1d, books)]
+
+
 def same(results, expected):
     """Whether all ranks have the same bits."""
     mine = all(a.tobytes() == b.tobytes() for a, b in zip(results, expected, strict=True))
@@ -100,6 +113,15 @@ def check_scenes():
         for late in (True, False):
             assert same(result(name, Gpu(HostRuntime(late))), expected), (name, late)
         print(f"{name}: same bits")
+
+
+def check_solids():
+    """Collisions and a ball that bursts, as late and as early as their order allows."""
+    for case, (steps, orders) in SOLIDS.items():
+        expected = solid_result(case, steps, Team(1))
+        for late in orders:
+            assert same(solid_result(case, steps, Gpu(HostRuntime(late))), expected), (case.__name__, late)
+        print(f"{case.__name__}: same bits")
 
 
 def nothing(*_, **__):
@@ -173,4 +195,4 @@ MUTANTS = {
 
 if __name__ == "__main__":
     install_abort_on_exception(Communicator())
-    {"scenes": check_scenes, "mutants": check_mutants, "gpu": check_gpu}[sys.argv[1]]()
+    {"scenes": check_scenes, "solids": check_solids, "mutants": check_mutants, "gpu": check_gpu}[sys.argv[1]]()

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.device.cpu import Team
+from distfsi.device.seam import Columns
 from distfsi.errors import Diverged
+from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
@@ -190,20 +192,23 @@ def check_own(blocks, everything, mine):
 def check_particles(communicator, grid, block_cells, number, reach):
     rng = np.random.default_rng(3)
     blocks = Blocks(grid, block_cells, communicator)
-    exchange = ParticleExchange(blocks)
+    device = Team(1)
+    exchange = ParticleExchange(blocks, device, device.build(EXCHANGE, {"DIMENSIONS": grid.dimensions}))
     everything = particle_columns(rng, number, grid.dimensions)
     holders = max(communicator.size - 1, 1)  # the last of several ranks starts with none
     mine = {name: column[np.arange(number) % holders == communicator.rank] for name, column in everything.items()}
-    mine = exchange.migrate(mine)
+    mine = Columns(device, mine)
+    block = exchange.migrate(mine)
     check_own(blocks, everything, mine)
     move = rng.normal(0.0, 0.1, everything["position"].shape)
     move_of = dict(zip(everything["id"].tolist(), move, strict=True))
     everything["position"] += move
     if len(mine["id"]):
         mine["position"] += np.array([move_of[i] for i in mine["id"].tolist()])
-    mine = exchange.migrate(mine)
+    block = exchange.migrate(mine, block)
     check_own(blocks, everything, mine)
-    check_own(blocks, everything, exchange.migrate(mine))  # nothing moved
+    assert exchange.migrate(mine, block) is block  # nothing moved
+    check_own(blocks, everything, mine)
     nothing = np.empty(0, dtype=np.int64)
     check_ghost_particles(
         blocks, everything, mine, exchange.ghosts(mine["position"], mine["id"], reach), reach, nothing
@@ -242,7 +247,7 @@ def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     ghosts = expected_ghosts(blocks, everything, reach, bonded)
     ids = np.concatenate([mine["id"], everything["id"][ghosts]])
     assert plan.own == len(mine["id"])
-    np.testing.assert_array_equal(plan.key[: len(ids)], 8 * ids)
+    np.testing.assert_array_equal(plan.key.here[: len(ids)], 8 * ids)
 
     row_of = {key: row for row, key in enumerate(everything["id"].tolist())}
     position = everything["position"]
@@ -250,11 +255,11 @@ def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     near = (np.abs(position - planes) <= reach) @ (1 << np.arange(position.shape[1]))
     np.bitwise_or.at(near, [row_of[i] for i in (bonded // 8).tolist()], bonded % 8)
     images = [8 * i + mask for i in ids.tolist() for mask in range(1, 8) if mask & near[row_of[i]] == mask]
-    assert plan.count == len(plan.key)
-    assert sorted(plan.key[len(ids) :].tolist()) == sorted(images)
+    assert plan.count == len(plan.key.here)
+    assert sorted(plan.key.here[len(ids) :].tolist()) == sorted(images)
 
-    rows = np.array([row_of[i] for i in (plan.key // 8).tolist()], dtype=int)
-    flipped = plan.key[:, None] % 8 >> np.arange(position.shape[1]) & 1 == 1
+    rows = np.array([row_of[i] for i in (plan.key.here // 8).tolist()], dtype=int)
+    flipped = plan.key.here[:, None] % 8 >> np.arange(position.shape[1]) & 1 == 1
     check_values(everything, mine, plan, rows, flipped, planes[rows])
 
 
@@ -269,7 +274,7 @@ def check_values(everything, mine, plan, rows, flipped, planes):
             (mine["position"], "position"),
             (mine["velocity"], tuple((a,) for a in axes)),
             (stress, tuple(pairs)),
-            (mine["body"], ((),)),
+            (mine["body"].astype(float), ((),)),
             (mine["mass"], ((0,),)),
         ]
     )
@@ -278,7 +283,7 @@ def check_values(everything, mine, plan, rows, flipped, planes):
         np.where(flipped, 2.0 * planes - position, position),
         everything["velocity"][rows] * sign,
         all_stress[rows] * np.stack([sign[:, a] * sign[:, b] for a, b in pairs], axis=1),
-        everything["body"][rows],
+        everything["body"][rows].astype(float),
         everything["mass"][rows] * sign[:, 0],
     ]
     for result, wanted in zip(results, expected, strict=True):

@@ -29,7 +29,7 @@ def solid(
     lower,
     upper,
     symmetric=(),
-    threads=1,
+    team=None,
     block_cells=4,
     gravity=None,
     viscosity=(1.0, 2.0),
@@ -50,7 +50,7 @@ def solid(
     )
     communicator = Communicator()
     blocks = Blocks(Grid.of(lower, upper, (16,) * D, kinds), scene.performance.block_cells, communicator)
-    return Solid(scene, blocks, communicator, Team(threads))
+    return Solid(scene, blocks, communicator, team or Team(1))
 
 
 def step(part, impulse=None):
@@ -80,34 +80,34 @@ def digest(part):
     return len(ids), hashlib.sha256(text).hexdigest()
 
 
-def colliding_discs(threads):
+def colliding_discs(team):
     """Two materials that meet near a symmetry plane and cross many blocks, one of them clamped."""
     left = body(d.Ball((-0.42, 0.3), 0.25), 0.05, 8930.0, (900.0, -400.0))
     clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
     right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
-    return solid([left, right], (-1.0, 0.0), (1.0, 1.0), (1,), threads, block_cells=2, gravity=(0.0, -1e3)), 60
+    return solid([left, right], (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, gravity=(0.0, -1e3)), 60
 
 
-def colliding_balls(threads):
+def colliding_balls(team):
     """Two balls in three dimensions, a quarter of each."""
     left = body(d.Ball((-0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (500.0, 0.0, 0.0))
     right = body(d.Ball((0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (-700.0, 0.0, 0.0))
-    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), threads, block_cells=2), 25
+    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), team, block_cells=2), 25
 
 
-def bonded_discs(threads):
+def bonded_discs(team):
     """Two discs of bonded particles, a half of each, that meet and bounce."""
     left = body(d.Ball((-0.42, 0.0), 0.3), 0.05, 8930.0, (900.0, 0.0))
     right = body(d.Ball((0.3, 0.0), 0.3), 0.04, 2000.0, (-300.0, 0.0), SOFT_EOS, SOFT)
     bodies = [left, right]
-    return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), threads, block_cells=2, form="total_lagrangian"), 80
+    return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, form="total_lagrangian"), 80
 
 
-def bursting_ball(threads):
+def bursting_ball(team):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
     failure = d.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, d.Scatter(10.0, 0.1, 1))
     ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
-    part = solid([ball], (-1.0, -1.0, 0.0), (1.0,) * 3, (2,), threads, block_cells=2, form="total_lagrangian")
+    part = solid([ball], (-1.0, -1.0, 0.0), (1.0,) * 3, (2,), team, block_cells=2, form="total_lagrangian")
     x = part.columns["position"]
     part.columns["velocity"] = 500.0 * x + 500.0 * np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
     return part, 90
@@ -119,7 +119,7 @@ def main():
     for case in (colliding_discs, colliding_balls, bonded_discs, bursting_ball):
         digests = []
         for threads in (1, 2):
-            part, steps = case(threads)
+            part, steps = case(Team(threads))
             start = part.blocks.block_of(part.columns["position"])
             before = part.communicator.concatenate(np.stack([part.columns["id"], start], axis=1))
             for _ in range(steps):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from distfsi.device.cpu import Team
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import (
     Ball,
@@ -344,11 +345,11 @@ def test_a_cantilever_swings_with_timoshenkos_period():
 
 
 def test_a_restart_goes_on_to_the_same_bits():
-    part, _ = bursting_ball(1)
+    part, _ = bursting_ball(Team(1))
     for _ in range(60):
         step(part)
     snapshot = {kind: {k: v.copy() for k, v in values.items()} for kind, values in part.snapshot().items()}
-    again, _ = bursting_ball(1)
+    again, _ = bursting_ball(Team(1))
     again.restore(snapshot)
     for each in (part, again):
         for _ in range(20):

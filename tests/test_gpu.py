@@ -1,4 +1,5 @@
-"""A fluid on a GPU's queues and memory, which the host stands in for: the bits of the CPU on any number of ranks."""
+"""Fluids and solids on a GPU's queues and memory, which the host stands in for: the bits of the CPU on any number of
+ranks."""
 
 import sys
 
@@ -14,6 +15,7 @@ from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation, gpu_of_rank
+from distfsi.study import works
 from launch import ROOT
 
 SCRIPT = ROOT / "tests/mpi_gpu.py"
@@ -22,6 +24,25 @@ SCRIPT = ROOT / "tests/mpi_gpu.py"
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_fluid_scenes_have_the_bits_of_the_cpu(mpiexec, ranks):
     assert mpiexec(ranks, SCRIPT, "scenes").count("same bits") == 3 * ranks
+
+
+def test_solids_have_the_bits_of_the_cpu(mpiexec):
+    """Both forms, on 2 ranks: particles change ranks, bonds are cut, there is debris."""
+    assert mpiexec(2, SCRIPT, "solids").count("same bits") == 2 * 2
+
+
+@pytest.mark.parametrize("form", ["updated_lagrangian", "total_lagrangian"])
+def test_a_step_of_a_solid_copies_no_columns(form):
+    """What goes between host and device in a step in which no particle changes blocks."""
+    runtime, sizes = HostRuntime(), []
+    simulation = Simulation.of(works.copper(16, 2, form), Communicator(), device=Gpu(runtime))
+    simulation.step()
+    for name, place in (("upload", 1), ("download", 0)):
+        copy = getattr(runtime, name)
+        setattr(runtime, name, lambda *a, copy=copy, place=place: (sizes.append(a[place].size), copy(*a)))
+    simulation.step()
+    assert simulation.solid.count == 256
+    assert 0 < max(sizes) < 64
 
 
 def test_every_wait_copy_and_order_is_needed(mpiexec):
@@ -79,5 +100,5 @@ def test_a_rank_without_gpu_says_why(monkeypatch):
 @pytest.mark.parametrize("path", ["inputs/steel_tube.toml", "inputs/sod.toml"])
 def test_a_run_that_gpus_cannot_do_is_refused(monkeypatch, path):
     monkeypatch.setitem(sys.modules, "cupy", None)
-    with pytest.raises(InputError, match="solids and peaks" if "tube" in path else "CuPy is not installed"):
+    with pytest.raises(InputError, match="coupled scenes and peaks" if "tube" in path else "CuPy is not installed"):
         gpu_of_rank(load(ROOT / path), Communicator())

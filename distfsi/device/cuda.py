@@ -86,6 +86,10 @@ class CupyRuntime:
         with self._streams[Queue.MAIN]:
             return self._cupy.empty(shape, dtype)
 
+    def zeros(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
+        with self._streams[Queue.MAIN]:
+            return self._cupy.zeros(shape, dtype)
+
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         import cupyx
 

@@ -36,7 +36,10 @@ class Runtime(Protocol):
         """Run the items 0 … count."""
 
     def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
-        """An array."""
+        """An array that may hold anything."""
+
+    def zeros(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
+        """An array of zeros."""
 
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         """Memory of the host that copies need not go around."""
@@ -100,6 +103,15 @@ class Gpu:
         self.runtime.upload(there, host.copy(), self._queue)
         return there
 
+    def empty(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
+        return self.runtime.empty(_lengths(shape), np.dtype(dtype))
+
+    def zeros(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
+        return self.runtime.zeros(_lengths(shape), np.dtype(dtype))
+
+    def beneath(self, host: np.ndarray) -> Any:
+        return self.runtime.empty(host.shape, host.dtype)
+
     def get(self, there: Any) -> np.ndarray:
         host = np.empty(there.shape, there.dtype)
         self.runtime.download(host, there, self._queue)
@@ -133,3 +145,7 @@ class Gpu:
         started = clock.perf_counter()
         self.runtime.synchronise(queue)
         self.seconds += clock.perf_counter() - started
+
+
+def _lengths(shape: tuple[int, ...] | int) -> tuple[int, ...]:
+    return (int(shape),) if np.ndim(shape) == 0 else tuple(map(int, shape))

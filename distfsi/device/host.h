@@ -121,6 +121,13 @@ static inline int __syncthreads_count(int predicate)
     return result;
 }
 
+static inline unsigned long long atomicAdd(unsigned long long *at, unsigned long long value)
+{
+    const unsigned long long before = *at;
+    *at += value;
+    return before;
+}
+
 static inline long long __double_as_longlong(double x) { long long bits; memcpy(&bits, &x, 8); return bits; }
 static inline double __longlong_as_double(long long bits) { double x; memcpy(&x, &bits, 8); return x; }
 static inline int __float_as_int(float x) { int bits; memcpy(&bits, &x, 4); return bits; }

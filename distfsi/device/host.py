@@ -121,6 +121,9 @@ class HostRuntime:
         memory.reshape(-1).view(np.uint8)[:] = 0xA5
         return HostArray(memory)
 
+    def zeros(self, shape: tuple[int, ...], dtype: np.dtype) -> HostArray:
+        return HostArray(np.zeros(shape, dtype))
+
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         return np.empty(count, dtype)
 

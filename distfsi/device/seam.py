@@ -8,7 +8,7 @@ at once, and the arrays of the device are those of the host.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import AbstractContextManager
 from types import SimpleNamespace
 from typing import Any, Protocol
@@ -47,6 +47,15 @@ class Device(Protocol):
     def array(self, host: np.ndarray) -> Any:
         """An array of the device with the values of a contiguous one of the host; on the CPU that array itself."""
 
+    def empty(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
+        """An array of the device that may hold anything."""
+
+    def zeros(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
+        """An array of the device that holds zeros."""
+
+    def beneath(self, host: np.ndarray) -> Any:
+        """An array of the device like one of the host, for copies between them; on the CPU that array itself."""
+
     def get(self, there: Any) -> np.ndarray:
         """The values of an array of the device, when all that was asked for before is done."""
 
@@ -72,15 +81,22 @@ class Device(Protocol):
 class Pair:
     """An array of the device and, when it is looked at, its copy on the host."""
 
-    def __init__(self, device: Device, host: np.ndarray):
-        self._device, self._there = device, device.array(host)
-        self.dtype, self.nbytes = host.dtype, host.nbytes
+    def __init__(self, device: Device, values: Any):
+        """`values`: an array of the host or of the device."""
+        self._device, self._there = device, device.array(values) if isinstance(values, np.ndarray) else values
+        self.dtype = self._there.dtype
+        self.nbytes = int(np.prod(self._there.shape)) * np.dtype(self.dtype).itemsize
         self._host: np.ndarray | None = None
 
     @property
     def there(self) -> Any:
         """The device's array, for a kernel that may write into it."""
         self._host = None
+        return self._there
+
+    @property
+    def read(self) -> Any:
+        """The device's array, for kernels that do not write into it."""
         return self._there
 
     def here(self) -> np.ndarray:
@@ -92,3 +108,45 @@ class Pair:
     def changed(self) -> None:
         """The values on the host have been changed."""
         self._device.put(self._there, self.here())
+
+
+class Columns(MutableMapping[str, np.ndarray]):
+    """Arrays by name, each a `Pair`: `columns[name]` are its values on the host. Who changes them in place calls
+    `changed`."""
+
+    def __init__(self, device: Device, arrays: Mapping[str, np.ndarray]):
+        self.device = device
+        self._pairs: dict[str, Pair] = {}
+        self.update(arrays)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._pairs[name].here()
+
+    def __setitem__(self, name: str, host: np.ndarray) -> None:
+        self._pairs[name] = Pair(self.device, np.ascontiguousarray(host))
+
+    def __delitem__(self, name: str) -> None:
+        del self._pairs[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._pairs)
+
+    def __len__(self) -> int:
+        return len(self._pairs)
+
+    def read(self, *names: str) -> list[Any]:
+        """The device's arrays, for kernels that do not write into them."""
+        return [self._pairs[name].read for name in names]
+
+    def write(self, *names: str) -> list[Any]:
+        """The device's arrays, for kernels that may write into them."""
+        return [self._pairs[name].there for name in names]
+
+    def adopt(self, name: str, there: Any) -> None:
+        """From now on an array of the device holds the values."""
+        self._pairs[name] = Pair(self.device, there)
+
+    def changed(self, *names: str) -> None:
+        """The values on the host have been changed."""
+        for name in names:
+            self._pairs[name].changed()

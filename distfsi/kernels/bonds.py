@@ -5,7 +5,7 @@ weight w of physics/bonds.py, `partner[i]` the partner's row among a rank's own 
 (count, columns below) is what a force needs of a particle: stiffness, displacement, bond stress.
 """
 
-from math import sqrt
+from math import log, sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.kernels.material import matrix_of
@@ -26,6 +26,7 @@ from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
 from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, trace
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
+VOLUME, BODY, FAILED, LOOSE, EXPOSED, DEBRIS = range(6)  # columns of `facts`: what ghosts are told besides
 
 
 @helper
@@ -79,20 +80,20 @@ def find_partners(begin, end, key, bond_count, keys, rows, partner):
 
 
 @driver
-def weigh(begin, end, reference, volume, size, body, bond_count, partner, bond):
+def weigh(begin, end, reference, facts, size, body, bond_count, partner, bond):
     """bond[i] = vectors and weights of the bonds; `size` are the reference smoothing lengths of the bodies."""
     for i in range(begin, end):
         for n in range(bond_count[i]):
             j = partner[i, n]
             X = difference(reference, 0, j, i)
-            w = -volume[j] * smoothing_slope(dot(X, X), size[body[i]])
+            w = -facts[j, VOLUME] * smoothing_slope(dot(X, X), size[body[i]])
             for d in static_range(DIMENSIONS):
                 bond[i, n * (DIMENSIONS + 1) + d] = w * X[d]
             bond[i, n * (DIMENSIONS + 1) + DIMENSIONS] = w
 
 
 @driver
-def fit(begin, end, chosen, bond_count, partner, bond, reference, displacement, correction, deformation, moments):
+def fit(begin, end, chosen, bond_count, partner, bond, reference, tension, correction, deformation, moments):
     """Row r: gradient correction and deformation gradient of particle chosen[r], from the bonds that it has.
 
     moments[r] = determinant and least eigenvalue of the moment of its bonds.
@@ -103,7 +104,7 @@ def fit(begin, end, chosen, bond_count, partner, bond, reference, displacement, 
         for n in range(bond_count[i]):
             j, g = partner[i, n], bond_vector(bond, i, n)
             moment = plus(moment, outer(difference(reference, 0, j, i), g))
-            total = plus(total, outer(difference(displacement, 0, j, i), g))
+            total = plus(total, outer(difference(tension, DISPLACEMENT, j, i), g))
         matrix = gradient_correction(moment)
         store_matrix(correction, r, matrix)
         store_matrix(deformation, r, identity_plus(1.0, product(total, matrix)))
@@ -112,7 +113,25 @@ def fit(begin, end, chosen, bond_count, partner, bond, reference, displacement, 
 
 
 @driver
-def cut(begin, end, position, reference, failed, loose, key, bond_count, partner, bond, lost):
+def keep_fit(
+    begin, end, chosen, fitted, fitted_deformation, moments, least, exposed_below, correction, deformation, loose,
+    exposed,
+):  # fmt: skip
+    """What fit() found of particle chosen[r], in row r, becomes its own, or it gets loose: too small a moment."""
+    for r in range(begin, end):
+        i = chosen[r]
+        if moments[r, 1] > least:
+            for k in range(DIMENSIONS * DIMENSIONS):
+                correction[i, k] = fitted[r, k]
+                deformation[i, k] = fitted_deformation[r, k]
+        else:
+            loose[i] = 1
+        if not (moments[r, 0] >= exposed_below):
+            exposed[i] = 1
+
+
+@driver
+def cut(begin, end, position, reference, facts, key, bond_count, partner, bond, lost):
     """Cut the bonds whose ends have both failed, where they are stretched, and those of a loose particle.
 
     lost[i] = how many bonds particle i has lost; the others keep their order.
@@ -122,8 +141,8 @@ def cut(begin, end, position, reference, failed, loose, key, bond_count, partner
         for n in range(bond_count[i]):
             j = partner[i, n]
             x, X = difference(position, 0, j, i), difference(reference, 0, j, i)
-            stretched = failed[i] > 0 and failed[j] > 0 and dot(x, x) > dot(X, X)
-            if not (stretched or loose[i] > 0 or loose[j] > 0):
+            stretched = facts[i, FAILED] > 0.0 and facts[j, FAILED] > 0.0 and dot(x, x) > dot(X, X)
+            if not (stretched or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
                 if kept < n:
                     key[i, kept] = key[i, n]
                     partner[i, kept] = j
@@ -136,25 +155,71 @@ def cut(begin, end, position, reference, failed, loose, key, bond_count, partner
         bond_count[i] = kept
 
 
+# ---- what is told ---------------------------------------------------------------------------------------------------
+
+
+@helper
+def has_failed(damage, i):
+    """Whether the material of a particle has failed."""
+    if FAILS:
+        return damage[i] >= 1.0
+    return False
+
+
+@driver
+def mark_parted(begin, end, bond_count, loose, damage, mark):
+    """mark[i] = 1 where a particle has failed, is loose or debris, else 0."""
+    for i in range(begin, end):
+        mark[i] = 1 if has_failed(damage, i) or loose[i] > 0 or bond_count[i] == 0 else 0
+
+
+@driver
+def mark_cut(begin, end, lost, mark):
+    """mark[i] = 1 where a particle has lost bonds, else 0."""
+    for i in range(begin, end):
+        mark[i] = 1 if lost[i] > 0 else 0
+
+
+@driver
+def mark_debris(begin, end, facts, mark):
+    """mark[i] = 1 for debris, else 0."""
+    for i in range(begin, end):
+        mark[i] = 1 if facts[i, DEBRIS] > 0.0 else 0
+
+
+@driver
+def tell(begin, end, volume, body, loose, exposed, bond_count, damage, facts):
+    """facts[i] = what others must know of a particle, in the columns above."""
+    for i in range(begin, end):
+        facts[i, VOLUME] = volume[i]
+        facts[i, BODY] = 1.0 * body[i]
+        facts[i, FAILED] = 1.0 if has_failed(damage, i) else 0.0
+        facts[i, LOOSE] = 1.0 if loose[i] > 0 else 0.0
+        facts[i, EXPOSED] = 1.0 if exposed[i] > 0 else 0.0
+        facts[i, DEBRIS] = 1.0 if bond_count[i] == 0 else 0.0
+
+
 # ---- a step ---------------------------------------------------------------------------------------------------------
 
 
 @driver
 def stress_bonds(
-    begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, damage,
-    tension,
+    begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, position,
+    reference, loose, damage, tension,
 ):  # fmt: skip
-    """tension[i] = stiffness and bond stress of particle i. What has cracked resists no strain, seen or unseen."""
+    """tension[i] = stiffness, displacement and bond stress of particle i. What has cracked resists no strain, seen or
+    unseen; the bonds of a loose particle no longer determine its strain."""
     for i in range(begin, end):
         kappa = zero_energy_stiffness(density[i], sound[i], strain[i], strength[body[i], 0], strength[body[i], 1])
         if FAILS:
             kappa = kappa * (1.0 - damage[i])
         S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
         stress = bond_stress(S, pressure[i] + viscous[i], matrix_of(deformation, i), matrix_of(correction, i), kappa)
-        tension[i, STIFFNESS] = kappa
+        tension[i, STIFFNESS] = 0.0 if loose[i] > 0 else kappa
         for a in static_range(DIMENSIONS):
+            tension[i, DISPLACEMENT + a] = position[i, a] - reference[i, a]
             for b in static_range(DIMENSIONS):
-                tension[i, 1 + DIMENSIONS + a * DIMENSIONS + b] = stress[a][b]
+                tension[i, 1 + DIMENSIONS + a * DIMENSIONS + b] = 0.0 if loose[i] > 0 else stress[a][b]
 
 
 @helper
@@ -231,3 +296,18 @@ def bound(begin, end, bond_count, size, body, sound, viscous, density, deformati
             a = tuple(acceleration[i, d] for d in static_range(DIMENSIONS))
             limits[i, 0] = signal_time(shortest, sound[i], viscous[i], density[i])
             limits[i, 1] = 0.3 * sqrt(shortest / max(sqrt(dot(a, a)), 1e-300))
+
+
+@driver
+def open_voids(begin, end, dt, volume, mass, density, bond_count, damage, void, gradient):
+    """Failed particles do not swell: what their surroundings give way is void, and must close again first."""
+    for i in range(begin, end):
+        if has_failed(damage, i) or bond_count[i] == 0:
+            divergence = trace(matrix_of(gradient, i))
+            swollen = log(mass[i] / (volume[i] * density[i]))
+            whole = swollen + void[i] + dt * divergence
+            solid = min(whole, 0.0)
+            void[i] = whole - solid
+            growth = ((solid - swollen) / dt - divergence) / DIMENSIONS
+            for d in static_range(DIMENSIONS):
+                gradient[i, d * DIMENSIONS + d] += growth

@@ -1,15 +1,54 @@
 """Loops over pairs of particles that touch without a bond."""
 
-from math import sqrt
+from math import pow, sqrt
 
 from distfsi.device.markers import driver, helper
-from distfsi.kernels.solid import DENSITY, SOUND_SPEED, VELOCITY, difference
+from distfsi.kernels.bonds import BODY, DEBRIS, EXPOSED
+from distfsi.kernels.solid import DENSITY, MASS, SOUND_SPEED, VELOCITY, difference
 from distfsi.physics.contact import contact_force
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
 
+IMAGE_BITS = 8  # a key is 8 id + the axes that an image is mirrored along
 SAME_BODY = 0.6  # of the size: lattices that flow plastically do not touch themselves
+
+
+@driver
+def mark_touching(begin, end, state, facts, key, through, size, side, mark):
+    """mark[i] = 1 for exposed particles and debris, else 0; size[i] [m] of a particle; side[i] = number of its body.
+
+    through (bodies,): the axes, as bits, along which a body goes on behind a symmetry plane; an image at a plane where
+    its body ends belongs to another one.
+    """
+    for i in range(begin, end):
+        own = int(facts[i, BODY])
+        beyond = key[i] % IMAGE_BITS & (IMAGE_BITS - 1 - through[own]) > 0
+        size[i] = pow(state[i, MASS] / state[i, DENSITY], 1.0 / DIMENSIONS)
+        side[i] = own + (len(through) if beyond else 0)
+        mark[i] = 1 if facts[i, EXPOSED] > 0.0 or facts[i, DEBRIS] > 0.0 else 0
+
+
+@driver
+def remember(begin, end, rows, key, facts, position, size, who, place, size_then):
+    """What still_valid() compares later of the particles `rows`."""
+    for r in range(begin, end):
+        i = rows[r]
+        who[r] = 2 * key[i] + (1 if facts[i, DEBRIS] > 0.0 else 0)
+        size_then[r] = size[i]
+        for d in static_range(DIMENSIONS):
+            place[r, d] = position[i, d]
+
+
+@driver
+def mark_invalid(begin, end, skin, rows, key, facts, position, size, who, place, size_then, mark):
+    """mark[r] = 1 where row r is another particle than it was, or has come closer to others than half its `skin`."""
+    for r in range(begin, end):
+        i = rows[r]
+        x = tuple(position[i, d] - place[r, d] for d in static_range(DIMENSIONS))
+        closer = sqrt(dot(x, x)) + 0.5 * (size[i] - size_then[r])
+        same = who[r] == 2 * key[i] + (1 if facts[i, DEBRIS] > 0.0 else 0)
+        mark[r] = 0 if same and closer <= 0.5 * skin * size_then[r] else 1
 
 
 @helper
@@ -28,12 +67,13 @@ def force_between(position, state, reference, size, body, i, j):
 
 @driver
 def touch(begin, end, rows, neighbours, neighbour_count, position, state, reference, size, body, mass, acceleration):
-    """Add the contact forces to the acceleration of the particles `rows`, each with its row of `neighbours`."""
+    """Add the contact forces to the acceleration of the particles `rows`, each with its row of `neighbours`, which are
+    counted among the `rows`."""
     for r in range(begin, end):
         i = rows[r]
         force = tuple(0.0 for _ in static_range(DIMENSIONS))
         for n in range(neighbour_count[r]):
-            push = force_between(position, state, reference, size, body, i, neighbours[r, n])
+            push = force_between(position, state, reference, size, body, i, rows[neighbours[r, n]])
             force = tuple(force[d] + push[d] for d in static_range(DIMENSIONS))
         for d in static_range(DIMENSIONS):
             acceleration[i, d] += force[d] / mass[i]
@@ -48,7 +88,7 @@ def heat_contact(
         i = rows[r]
         power = 0.0
         for n in range(neighbour_count[r]):
-            j = neighbours[r, n]
+            j = rows[neighbours[r, n]]
             push = force_between(position, state, reference, size, body, i, j)
             power -= 0.5 * dot(push, difference(motion, 0, i, j))
         energy[i] += dt * power / mass[i]

@@ -6,7 +6,7 @@ images. All sums gather: the neighbours of a particle are visited in one order o
 
 from math import floor
 
-from distfsi.device.markers import driver, helper
+from distfsi.device.markers import ByHand, driver, helper
 from distfsi.kernels.material import matrix_of
 from distfsi.physics.pair import (
     approach_speed,
@@ -40,20 +40,24 @@ def find_cells(begin, end, position, lower, size, low, high, strides, cell):
         cell[i] = index
 
 
+def search_block(constants, arguments):
+    """One block of threads sorts all."""
+    return {"THREADS": 256, "SHARED": 0}
+
+
+@ByHand("search.cu", (), search_block)
 @driver
-def fill_cells(cell, start, order):
-    """Counting sort: order[start[c] … start[c + 1]] = the particles of search cell c; `start` is zero on entry."""
+def fill_cells(begin, end, cell, start, order):
+    """Counting sort: order[start[c] … start[c + 1]] = the particles of search cell c. There is one item: all."""
+    for c in range(len(start)):
+        start[c] = 0
     for i in range(len(cell)):
-        start[cell[i] + 1] += 1
+        start[cell[i]] += 1
     for c in range(1, len(start)):
         start[c] += start[c - 1]
-    for i in range(len(cell)):
-        c = cell[i]
-        order[start[c]] = i
-        start[c] += 1
-    for c in range(len(start) - 1, 0, -1):
-        start[c] = start[c - 1]
-    start[0] = 0
+    for i in range(len(cell) - 1, -1, -1):
+        start[cell[i]] -= 1
+        order[start[cell[i]]] = i
 
 
 @driver
@@ -88,6 +92,15 @@ def find_neighbours(begin, end, position, state, cell, start, order, rows, neigh
                         neighbours[i, found] = j
                     found += 1
         neighbour_count[i] = found
+
+
+@driver
+def place_among(begin, end, rows, table, count, neighbours, neighbour_count):
+    """The neighbours of the particles `rows`, counted among these, become those of all."""
+    for r in range(begin, end):
+        neighbour_count[rows[r]] = count[r]
+        for n in range(count[r]):
+            neighbours[rows[r], n] = rows[table[r, n]]
 
 
 # ---- pairs ---------------------------------------------------------------------------------------------------------
@@ -145,6 +158,13 @@ def correct(begin, end, position, state, neighbours, neighbour_count, pressure, 
         S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
         store_matrix(correction, i, matrix)
         store_matrix(stress, i, corrected_stress(S, pressure[i], matrix))
+
+
+@driver
+def press(begin, end, pressure, pushed):
+    """pushed[i] = the pressure where it is none of tension, else 0."""
+    for i in range(begin, end):
+        pushed[i] = max(pressure[i], 0.0)
 
 
 @driver

@@ -30,7 +30,7 @@ class Messages:
         """A buffer for all messages about a field of so many variables."""
         values = device.pinned(int(self.cells[-1]) * variables, dtype)
         parts = [values[a:b] for a, b in pairwise((self.cells * variables).tolist())]
-        return Buffer(values, device.array(values), list(zip(self.ranks.tolist(), parts, strict=True)))
+        return Buffer(values, device.beneath(values), list(zip(self.ranks.tolist(), parts, strict=True)))
 
 
 @dataclass

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from distfsi.device.seam import Columns, Device, Pair
 from distfsi.errors import InputError
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.rows import Rows, chunks
 
 IMAGES = 8  # an id and its images: bit a of an image's number says that it is mirrored along axis a
 
@@ -30,67 +34,85 @@ class Route:
         arriving = np.empty_like(leaving)
         self._world.Alltoall(leaving, arriving)
         self._leaving, self._arriving = self._slices(leaving), self._slices(arriving)
-        self.arriving = int(arriving.sum())
+        self.leaving, self.arriving = len(ranks), int(arriving.sum())
 
     @staticmethod
     def _slices(counts: np.ndarray) -> list[tuple[int, slice]]:
         ends = np.cumsum(counts)
         return [(int(r), slice(ends[r] - counts[r], ends[r])) for r in np.flatnonzero(counts)]
 
-    def transfer(self, rows: np.ndarray) -> np.ndarray:
-        """Send `rows` (n,) of a structured dtype; the rows from all others, in rank order. One message per pair."""
-        arrived = np.empty(self.arriving, dtype=rows.dtype)
+    def transfer(self, rows: np.ndarray, arrived: np.ndarray) -> None:
+        """Send `rows` (n, …); those from all others arrive in rank order, of the same type. One message per pair."""
         requests = [self._world.Irecv(arrived[part].view(np.uint8), rank) for rank, part in self._arriving]
         requests += [self._world.Isend(rows[part].view(np.uint8), rank) for rank, part in self._leaving]
         MPI.Request.Waitall(requests)
+
+    def brought(self, columns: dict[str, np.ndarray]) -> np.ndarray:
+        """Send the rows (n, …) of all columns as one structured array; those that arrive, as another."""
+        dtype = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+        rows, arrived = np.empty(self.leaving, dtype), np.empty(self.arriving, dtype)
+        for name, column in columns.items():
+            rows[name] = column
+        self.transfer(rows, arrived)
         return arrived
-
-
-def pack(columns: dict[str, np.ndarray], rows: np.ndarray) -> np.ndarray:
-    """The `rows` of all columns as one structured array."""
-    packed = np.empty(len(rows), dtype=[(name, c.dtype, c.shape[1:]) for name, c in columns.items()])
-    for name, column in columns.items():
-        packed[name] = column[rows]
-    return packed
-
-
-def ascending(block: np.ndarray, id: np.ndarray) -> bool:
-    """Whether the pairs (block, id) are in order."""
-    same = block[1:] == block[:-1]
-    return bool(((block[1:] > block[:-1]) | (same & (id[1:] > id[:-1]))).all())
 
 
 class ParticleExchange:
     """Brings particles, and copies of them, to the ranks that need them."""
 
-    def __init__(self, blocks: Blocks) -> None:
-        self.blocks = blocks
+    def __init__(self, blocks: Blocks, device: Device, kernels: SimpleNamespace) -> None:
+        """`kernels`: those of kernels/rows.py and kernels/particles.py as built by the device of the particles."""
+        self.blocks, self.device, self.kernels = blocks, device, kernels
+        self.rows = Rows(device, kernels)
+        grid = blocks.grid
+        numbers = (grid.lower, grid.spacing, grid.cells, blocks.block_cells, blocks.curve_index)
+        self._grid = [device.array(np.array(values)) for values in numbers]
+        self._owners = device.array(blocks.owners)
+        self._key: Key | None = None
+        self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.staged: Any = None  # memory of the host that the last exchange may still read
 
-    def migrate(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Collective. All particles on the ranks that own their blocks, sorted by (block, id).
+    def migrate(self, columns: Columns, block: Pair | None = None) -> Pair:
+        """Collective. All particles to the ranks that own their blocks, sorted by (block, id).
 
         Each column is (n,) or (n, k), with the same names and dtypes on all ranks, among them "id" (n,) int64 and
-        "position" (n, dimensions) [m]. Where nothing changes, the columns returned are the ones given.
+        "position" (n, dimensions) [m]. Returns the curve index (own,) of each particle's block; `block` is what the
+        last call returned, None for particles in any order. It comes back where no particle has changed blocks.
         """
-        communicator = self.blocks.communicator
-        block = self.blocks.block_of(columns["position"])
-        owner = self.blocks.owners[block]
-        stays = owner == communicator.rank
-        leaving = np.flatnonzero(~stays)
+        communicator, device = self.blocks.communicator, self.device
+        (position,) = columns.read("position")
+        count = position.shape[0]
+        block = Pair(device, np.full(count, -1)) if block is None else block
+        moved = self._some_moved(position, block)
+        now = block.here() if moved else np.empty(0, dtype=np.int64)
+        owner = self.blocks.owners[now]
+        leaving = np.flatnonzero(owner != communicator.rank)
         leaving = leaving[np.argsort(owner[leaving], kind="stable")]
         route = Route(communicator, owner[leaving])
-        arrived = route.transfer(pack(columns, leaving))
-        if len(leaving) or route.arriving:
-            columns = {name: np.concatenate([column[stays], arrived[name]]) for name, column in columns.items()}
-            block = self.blocks.block_of(columns["position"])
-        if ascending(block, columns["id"]):
-            return columns
-        order = np.lexsort((columns["id"], block))
-        return {name: column[order] for name, column in columns.items()}
+        if not moved and not route.arriving:
+            return block
+        now, there = block.here(), device.array(leaving)
+        arrived = route.brought({name: device.get(self.rows.taken(*columns.read(name), there)) for name in columns})
+        stays = np.flatnonzero(self.blocks.owners[now] == communicator.rank)
+        home = np.concatenate([now[stays], self.blocks.block_of(arrived["position"])])
+        order = np.lexsort((np.concatenate([columns["id"][stays], arrived["id"]]), home))
+        rows = np.concatenate([stays, count + np.arange(len(arrived))])[order]
+        if not np.array_equal(rows, np.arange(count)):
+            there = device.array(rows)
+            for name in columns:
+                others = device.array(np.ascontiguousarray(arrived[name]))
+                columns.adopt(name, self.rows.taken(*columns.read(name), there, others))
+        return Pair(device, home[order])
+
+    def _some_moved(self, position: Any, block: Pair) -> bool:
+        """Whether particles are in other blocks than `block` says; then it says which."""
+        moved = self.device.empty(chunks(position.shape[0]), np.int64)
+        self.rows.reduce(self.kernels.find_moved, position.shape[0], position, block.there, *self._grid, moved)
+        return bool(self.device.get(moved).any())
 
     def ghosts(
         self,
-        position: np.ndarray,
+        position: Any,
         id: np.ndarray,
         reach: float,
         bonded: np.ndarray | None = None,
@@ -102,31 +124,75 @@ class ParticleExchange:
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
         at the ends of the grid extend to infinity. Particles and ghosts within `image_reach` [m], by default `reach`,
         of the domain's ends of a kind among `mirrors` have images.
-        `position` (own, dimensions) [m] and `id` (own,) are those of this rank's particles after `migrate`; `bonded`,
-        on all ranks or none, holds the keys (see GhostPlan) of particles and images that this rank needs wherever they
-        are. Raises InputError when a particle could have two images along one axis.
+        `position` (own, dimensions) [m], of the device, and `id` (own,) are those of this rank's particles after
+        `migrate`; `bonded`, on all ranks or none, holds the keys (see GhostPlan) of particles and images that this rank
+        needs wherever they are. Raises InputError when a particle could have two images along one axis.
         """
-        own = len(id)
+        own, device = len(id), self.device
         image_reach = reach if image_reach is None else image_reach
         planes = self.planes(image_reach, mirrors)
-        pairs = self._near(position, reach)
-        if bonded is not None and self.blocks.communicator.size > 1:
-            pairs += self._bonded(id, np.unique(bonded // IMAGES))
+        border, asked = self._border(position, reach, image_reach, planes), self._bonded(id, bonded)
+        chosen = np.unique(np.concatenate([border, *asked.values(), self._with_images(id, bonded)]))
+        near = device.get(self.rows.taken(position, device.array(chosen)))
+        pairs = [rank * own + rows for rank, rows in asked.items()] + self._near(near, chosen, own, reach)
         ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
-        arrived = route.transfer(pack({"position": position, "id": id}, rows))
-        position, id = np.concatenate([position, arrived["position"]]), np.concatenate([id, arrived["id"]])
-        near = np.zeros(len(id), dtype=np.int64)
-        plane = np.zeros_like(position)
+        arrived = route.brought({"position": near[np.searchsorted(chosen, rows)], "id": id[rows]})
+        place = np.concatenate([chosen, own + np.arange(len(arrived))])  # of what may have images
+        position, known = np.concatenate([near, arrived["position"]]), np.concatenate([id[chosen], arrived["id"]])
+        mask, plane = self._mirrored(position, known, image_reach, planes, bonded)
+        source, mask = images(mask)
+        key = self._known_key(id, np.concatenate([arrived["id"] * IMAGES, known[source] * IMAGES + mask]))
+        return GhostPlan(
+            own, len(key.here), key, self, route, device.array(rows), Images(device, place[source], mask, plane[source])
+        )
+
+    def _border(self, position: Any, reach: float, image_reach: float, planes: list[tuple[int, float]]) -> np.ndarray:
+        """The own particles within `reach` of other ranks' blocks or `image_reach` of a plane."""
+        communicator = self.blocks.communicator
+        if communicator.size == 1 and not planes:
+            return np.empty(0, dtype=np.int64)
+        axes, places = (np.array([plane[k] for plane in planes], dtype) for k, dtype in ((0, np.int64), (1, float)))
+        mark = self.device.empty(position.shape[0], np.int8)
+        self.device.run(
+            self.kernels.find_border, position.shape[0], position, reach, image_reach, self.device.array(axes),
+            self.device.array(places), *self._grid, self._owners, communicator.rank, mark,
+        )  # fmt: skip
+        return self.device.get(self.rows.marked(mark)[1])
+
+    def _mirrored(
+        self,
+        position: np.ndarray,
+        id: np.ndarray,
+        reach: float,
+        planes: list[tuple[int, float]],
+        bonded: np.ndarray | None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The axes (n,), as bits, along which particles have images, and the places (n, dimensions) of the planes."""
+        near, plane = np.zeros(len(id), dtype=np.int64), np.zeros_like(position)
         for axis, place in planes:
-            close = np.abs(position[:, axis] - place) <= image_reach
+            close = np.abs(position[:, axis] - place) <= reach
             near[close] |= 1 << axis
             plane[close, axis] = place
         if bonded is not None:
             self._need_images(position, id, bonded, planes, near, plane)
-        source, mask = images(near)
-        key = np.concatenate([id * IMAGES, id[source] * IMAGES + mask])
-        return GhostPlan(own, len(key), key, route, rows, source, mask, plane[source])
+        return near, plane
+
+    def _with_images(self, id: np.ndarray, bonded: np.ndarray | None) -> np.ndarray:
+        """The own particles of which a bond needs an image; found again when `id` or `bonded` are other arrays."""
+        if bonded is None:
+            return np.empty(0, dtype=np.int64)
+        if self._images is None or self._images[0] is not id or self._images[1] is not bonded:
+            wanted = bonded[bonded % IMAGES > 0] // IMAGES
+            self._images = id, bonded, np.flatnonzero(np.isin(id, wanted)) if len(wanted) else wanted
+        return self._images[2]
+
+    def _known_key(self, id: np.ndarray, others: np.ndarray) -> Key:
+        """The keys of the own particles and the others: the same object as last time if they are the same."""
+        last = self._key
+        if last is None or last.id is not id or not np.array_equal(last.here[len(id) :], others):
+            self._key = Key(self.device, id, np.concatenate([id * IMAGES, others]))
+        return self._key
 
     @staticmethod
     def _need_images(
@@ -147,26 +213,27 @@ class ParticleExchange:
             nearest = places[np.argmin(np.abs(position[rows, axis][:, None] - places), axis=1)]
             plane[rows, axis] = nearest
 
-    def _bonded(self, id: np.ndarray, bonded: np.ndarray) -> list[np.ndarray]:
-        """rank * own + row of the own particles whose ids other ranks ask for."""
+    def _bonded(self, id: np.ndarray, bonded: np.ndarray | None) -> dict[int, np.ndarray]:
+        """Collective. The own particles whose ids other ranks ask for, by rank."""
         communicator = self.blocks.communicator
-        asked = communicator.allgather(bonded)
+        if bonded is None or communicator.size == 1:
+            return {}
+        asked = communicator.allgather(np.unique(bonded // IMAGES))
         others = (rank for rank in range(communicator.size) if rank != communicator.rank)
-        return [rank * len(id) + np.flatnonzero(np.isin(id, asked[rank])) for rank in others]
+        return {rank: np.flatnonzero(np.isin(id, asked[rank])) for rank in others}
 
-    def _near(self, position: np.ndarray, reach: float) -> list[np.ndarray]:
-        """rank * own + row of the own particles within `reach` of other ranks' blocks."""
+    def _near(self, position: np.ndarray, rows: np.ndarray, own: int, reach: float) -> list[np.ndarray]:
+        """rank * own + row of the particles (n,) of the `rows` at the positions (n, dimensions) that are within `reach`
+        of other ranks' blocks."""
         blocks = self.blocks
-        lowest, highest = blocks.coordinates_of(position - reach), blocks.coordinates_of(position + reach)
-        near = np.flatnonzero(blocks.index_at(lowest) != blocks.index_at(highest))
-        lowest, highest = lowest.T[:, near], highest.T[:, near]
+        lowest, highest = (blocks.coordinates_of(place).T for place in (position - reach, position + reach))
         pairs = [np.empty(0, dtype=np.int64)]
         for offset in product(*(range(n + 1) for n in (highest - lowest).max(axis=1, initial=0))):
             block = lowest + np.array(offset)[:, None]
             inside = (block <= highest).all(axis=0)
             rank = blocks.owners[blocks.index_at(block[:, inside].T)]
             other = rank != blocks.communicator.rank
-            pairs.append(rank[other] * len(position) + near[inside][other])
+            pairs.append(rank[other] * own + rows[inside][other])
         return pairs
 
     def planes(self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",)) -> list[tuple[int, float]]:
@@ -189,44 +256,80 @@ def images(near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(sources), np.concatenate(masks)
 
 
+class Key:
+    """Keys (count,) int64 of particles, ghosts and images on the host (`here`) and on the device (`there`)."""
+
+    def __init__(self, device: Device, id: np.ndarray, here: np.ndarray) -> None:
+        self.id, self.here, self.there = id, here, device.array(here)
+
+
+class Images:
+    """On the device: the rows (count,) that images are of, the axes they are mirrored along, places of the planes."""
+
+    def __init__(self, device: Device, source: np.ndarray, mask: np.ndarray, plane: np.ndarray) -> None:
+        self.count = len(source)
+        self.source, self.mask, self.plane = device.array(source), device.array(mask), device.array(plane)
+
+
 @dataclass
 class GhostPlan:
     """This rank's particles, then its ghosts in (block, id) order, then the images of both.
 
     own     number of this rank's particles
     count   number of particles, ghosts and images
-    key     (count,) int64: 8 id + the axes an image is mirrored along (bit a: axis a); unique
+    key     (count,) int64: 8 id + the axes an image is mirrored along (bit a: axis a); unique. One object as long as
+            nothing of it changes
     """
 
     own: int
     count: int
-    key: np.ndarray
+    key: Key
+    _exchange: ParticleExchange
     _route: Route
-    _rows: np.ndarray
-    _image_source: np.ndarray
-    _image_mask: np.ndarray
-    _image_plane: np.ndarray
+    _rows: Any
+    _images: Images
 
-    def exchange(self, arrays: Sequence[tuple[np.ndarray, Parity]]) -> list[np.ndarray]:
-        """Collective. Each (array (own,) or (own, k), parity) extended to (count, ...) with ghosts and images."""
-        columns = {str(i): array for i, (array, _) in enumerate(arrays)}
-        arrived = self._route.transfer(pack(columns, self._rows))
-        return [self._extend(array, arrived[str(i)], parity) for i, (array, parity) in enumerate(arrays)]
+    def exchange(self, arrays: Sequence[tuple[Any, Parity]]) -> list[Any]:
+        """Collective. Each (array (own,) or (own, k) of float64, parity) extended to (count, ...) with ghosts and
+        images; arrays are the device's."""
+        widths = np.array([int(np.prod(array.shape[1:])) for array, _ in arrays])
+        columns, stride = np.cumsum(widths) - widths, int(widths.sum())
+        packed = self._brought([array for array, _ in arrays], widths, columns, stride)
+        return [
+            self._extended(array, parity, int(width), stride, int(column), packed)
+            for (array, parity), width, column in zip(arrays, widths, columns, strict=True)
+        ]
 
-    def _extend(self, array: np.ndarray, ghosts: np.ndarray, parity: Parity) -> np.ndarray:
-        extended = np.empty((self.count, *array.shape[1:]), dtype=array.dtype)
-        particles = self.own + len(ghosts)
-        extended[: self.own] = array
-        extended[self.own : particles] = ghosts
-        if particles < self.count:
-            extended[particles:] = self._mirror(extended[self._image_source], parity)
-        return extended
+    def _brought(self, arrays: Sequence[Any], widths: np.ndarray, columns: np.ndarray, stride: int) -> Any:
+        """The packed rows of the ghosts."""
+        exchange, device, route = self._exchange, self._exchange.device, self._route
+        if not route.leaving and not route.arriving:
+            return device.empty(0)
+        leaving, arriving = (device.pinned(n * stride, np.float64) for n in (route.leaving, route.arriving))
+        there, arrived = device.beneath(leaving), device.beneath(arriving)
+        device.finish_beside()
+        with device.beside():
+            for array, width, column in zip(arrays, widths, columns, strict=True):
+                row = (self._rows, int(width), array.reshape(-1), stride, int(column), there)
+                device.run(exchange.kernels.pack_rows, route.leaving, *row)
+            device.take(leaving, there)
+        device.finish_beside()
+        route.transfer(leaving.reshape(-1, stride), arriving.reshape(-1, stride))
+        with device.beside():
+            device.put(arrived, arriving)
+        device.join()
+        exchange.staged = arriving
+        return arrived
 
-    def _mirror(self, values: np.ndarray, parity: Parity) -> np.ndarray:
-        """The `values` of the images' sources as seen in the mirrors."""
+    def _extended(self, array: Any, parity: Parity, width: int, stride: int, column: int, packed: Any) -> Any:
+        device, kernels, images = self._exchange.device, self._exchange.kernels, self._images
+        extended, first = device.empty((self.count, *array.shape[1:])), self.count - images.count
+        flat = extended.reshape(-1)
+        device.run(kernels.extend, first, self.own, width, array.reshape(-1), stride, column, packed, flat)
+        mirrors = (first, width, images.source, images.mask)
         if parity == "position":
-            mirrored = self._image_mask[:, None] >> np.arange(values.shape[1]) & 1 == 1
-            return np.where(mirrored, 2.0 * self._image_plane - values, values)
-        flips = np.stack([self._image_mask >> axis & 1 for axis in range(3)])
-        odd = np.stack([flips[list(axes)].sum(axis=0) % 2 == 1 for axes in parity], axis=1)
-        return np.where(odd.reshape(values.shape), -values, values)
+            device.run(kernels.mirror_positions, images.count, *mirrors, images.plane, flat)
+        elif images.count:
+            odd = [sum(1 << axis for axis in set(axes) if axes.count(axis) % 2) for axes in parity]
+            device.run(kernels.mirror_values, images.count, *mirrors, device.array(np.array(odd)), flat)
+        return extended

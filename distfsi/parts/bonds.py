@@ -8,15 +8,16 @@ gone is debris: from then on the updated Lagrangian form moves it among other de
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Columns
 from distfsi.errors import Diverged
 from distfsi.kernels import bonds as kernels
-from distfsi.kernels.solid import VELOCITY
+from distfsi.kernels import motion
 from distfsi.mesh.communicator import Communicator
-from distfsi.mesh.particles import IMAGES, ParticleExchange
+from distfsi.mesh.particles import IMAGES, Key, ParticleExchange
 from distfsi.parts import contact, pieces
 from distfsi.parts.contact import Contact
 from distfsi.parts.neighbours import Near, NeighbourSearch
@@ -27,18 +28,24 @@ DRIVERS = (
     kernels.find_partners,
     kernels.weigh,
     kernels.fit,
+    kernels.keep_fit,
+    kernels.mark_parted,
+    kernels.mark_cut,
+    kernels.mark_debris,
+    kernels.tell,
     kernels.cut,
     kernels.stress_bonds,
     kernels.pull,
     kernels.stretch,
     kernels.bound,
+    kernels.open_voids,
+    motion.mean_motion,
     *contact.DRIVERS,
 )
-MATERIAL = ("density", "sound_speed", "plastic_strain", "deviator", "pressure", "viscous_pressure")
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 LOOSE_BELOW = 0.1  # least eigenvalue of the moment, below which the gradient's correction fades
 ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
-VOLUME, BODY, FAILED, LOOSE, EXPOSED, DEBRIS = range(6)  # columns of what ghosts are told besides
+FACTS = 6  # columns of what ghosts are told besides, see kernels/bonds.py
 
 
 class TotalLagrangian:
@@ -58,71 +65,84 @@ class TotalLagrangian:
     def __init__(
         self,
         kernels: SimpleNamespace,
-        team: Team,
+        exchange: ParticleExchange,
         search: NeighbourSearch,
         communicator: Communicator,
         scene: Solid,
-        strength: np.ndarray,
+        strength: Any,
         dimensions: int,
     ):
-        self._kernels, self._team, self._communicator, self._strength = kernels, team, communicator, strength
+        """`strength`: that table of the materials, on the device."""
+        self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
+        self._communicator, self._strength = communicator, strength
         self._spacing = np.array([body.spacing for body in scene.bodies])
-        self._size = scene.smoothing * self._spacing
+        self._support = 2.0 * scene.smoothing * self._spacing.max()
+        self._size = self._device.array(scene.smoothing * self._spacing)
         self._dimensions, self._search = dimensions, search
-        self._debris = UpdatedLagrangian(kernels, team, search, dimensions)
-        self._contact = Contact(kernels, team, search, dimensions)
+        self._debris = UpdatedLagrangian(kernels, self._device, search, dimensions)
+        self._contact = Contact(kernels, self._rows, search, dimensions)
         self._ids: np.ndarray | None = None
         self._cut_since_labelled = True
 
     # ---- the reference state ----------------------------------------------------------------------------------------
 
-    def bind(self, c: dict[str, np.ndarray], exchange: ParticleExchange) -> None:
+    def bind(self, c: Columns, exchange: ParticleExchange) -> None:
         """Collective. Make the bonds of the particles where they are now, and add the columns."""
-        n, D = len(c["id"]), self._dimensions
+        n, D, device = len(c["id"]), self._dimensions, self._device
         c["reference"], c["volume"] = c["position"].copy(), c["mass"] / c["density"]
         first, key = self._near_each_other(c, exchange)
         count = np.bincount(first, minlength=n)
         width = int(self._communicator.maximum(np.array([count.max(initial=1)]))[0])
-        c["bonds"] = np.full((n, width), -1)
-        c["bonds"][first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = key
-        c["bond_count"] = count
-        c["viscous_pressure"], c["void"] = np.zeros((2, n))
+        bonds = np.full((n, width), -1)
+        bonds[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = key
+        c["bonds"], c["bond_count"] = bonds, count
+        c["viscous_pressure"], c["void"] = np.zeros(n), np.zeros(n)
         c["loose"] = np.zeros(n, dtype=np.int64)
-        plan = exchange.ghosts(c["position"], c["id"], 2.0 * self._size.max(), self.asked(c))
-        self._place(c, plan.key, *plan.exchange([(c["reference"], "position"), (c["volume"], ((),))]))
-        c["correction"], c["deformation"], moments = self._fit(np.arange(n), c, np.zeros((plan.count, D)))
-        c["exposed"] = (moments[:, 0] < EXPOSED_BELOW).astype(np.int64)
+        plan = exchange.ghosts(*c.read("position"), c["id"], self._support, self.asked(c))
+        volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
+        self._place(c, plan.key, *plan.exchange([(*c.read("reference"), "position"), (volume, ((),))]))
+        correction, deformation, moments = self._fit(
+            n, device.array(np.arange(n)), c, device.zeros((plan.count, 1 + D))
+        )
+        c.adopt("correction", correction)
+        c.adopt("deformation", deformation)
+        c["exposed"] = (device.get(moments)[:, 0] < EXPOSED_BELOW).astype(np.int64)
         self.label_pieces(c, exchange)
 
-    def label_pieces(self, c: dict[str, np.ndarray], exchange: ParticleExchange) -> None:
+    def label_pieces(self, c: Columns, exchange: ParticleExchange) -> None:
         """Collective. Bring the labels of the pieces up to date."""
         if self._communicator.maximum(np.array([self._cut_since_labelled]))[0] == 0.0:
             return
         self._cut_since_labelled = False
-        plan = exchange.ghosts(c["position"], c["id"], 0.0, self.asked(c))
-        id = plan.key[plan.key % IMAGES == 0] // IMAGES
+        plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.asked(c))
+        id = plan.key.here[plan.key.here % IMAGES == 0] // IMAGES
         order = np.argsort(id, kind="stable")
-        first, place = np.nonzero(c["bonds"] >= 0)
-        second = order[np.searchsorted(id, c["bonds"][first, place] // IMAGES, sorter=order)]
-        c["piece"] = pieces.label(id, np.stack([first, second]), plan, self._communicator)
+        bonds = c["bonds"]
+        first, place = np.nonzero(bonds >= 0)
+        second = order[np.searchsorted(id, bonds[first, place] // IMAGES, sorter=order)]
+        c["piece"] = pieces.label(id, np.stack([first, second]), plan, self._device, self._communicator)
 
-    def _near_each_other(self, c: dict[str, np.ndarray], exchange: ParticleExchange) -> tuple[np.ndarray, np.ndarray]:
+    def _near_each_other(self, c: Columns, exchange: ParticleExchange) -> tuple[np.ndarray, np.ndarray]:
         """Own rows and keys of all pairs of neighbours of one body, in ascending order."""
-        support = 2.0 * self._size.max()
-        plan = exchange.ghosts(c["position"], c["id"], support)
-        state = np.column_stack([c["mass"], c["density"], c["h"]])
-        given = [(c["position"], "position"), (state, ((),) * 3), (c["body"], ((),))]
+        device = self._device
+        plan = exchange.ghosts(*c.read("position"), c["id"], self._support)
+        state = device.array(np.column_stack([c["mass"], c["density"], c["h"]]))
+        body = device.array(c["body"].astype(float))
+        given = [(*c.read("position"), "position"), (state, ((),) * 3), (body, ((),))]
         position, state, body = plan.exchange(given)
-        self._search.find(plan.own, position, state, plan.key, support)
-        first, place = np.nonzero(np.arange(self._search.table.shape[1]) < self._search.count[:, None])
-        second = self._search.table[first, place]
-        self._through = self._through_planes(c, exchange)
-        bonded = self._side(body, plan.key)[second] == body[first]
-        first, key = first[bonded], plan.key[second[bonded]]
+        self._search.find(plan.own, position, state, plan.key.there, self._support)
+        table, body, key = device.get(self._search.table), device.get(body).astype(np.int64), plan.key.here
+        first, place = np.nonzero(np.arange(table.shape[1]) < device.get(self._search.count)[:, None])
+        second = table[first, place]
+        through = self._through_planes(c, exchange)
+        self._through = device.array(through)
+        side = body + len(through) * (key % IMAGES & ~through[body] > 0)  # an image where a body ends is another's
+        bonded = side[second] == body[first]
+        first, key = first[bonded], key[second[bonded]]
         order = np.lexsort((key, first))
         return first[order], key[order]
 
-    def _through_planes(self, c: dict[str, np.ndarray], exchange: ParticleExchange) -> np.ndarray:
+    def _through_planes(self, c: Columns, exchange: ParticleExchange) -> np.ndarray:
         """(bodies,) the axes, as bits, along which a body goes on behind a symmetry plane."""
         touching = np.zeros((len(self._spacing), self._dimensions))
         for axis, place in exchange.planes():
@@ -131,138 +151,124 @@ class TotalLagrangian:
         touching = self._communicator.maximum(touching.ravel()).reshape(touching.shape)
         return (touching.astype(np.int64) << np.arange(self._dimensions)).sum(axis=1)
 
-    def _side(self, body: np.ndarray, key: np.ndarray) -> np.ndarray:
-        """(n,) numbers of the bodies of particles and images; an image at a plane where its body ends is another's."""
-        return body + len(self._through) * (key % IMAGES & ~self._through[body] > 0)
+    def _place(self, c: Columns, key: Key, reference: Any, facts: Any) -> None:
+        """Find the partners' rows, the vectors and the weights of the bonds, if the rows have changed since.
 
-    def _place(self, c: dict[str, np.ndarray], key: np.ndarray, reference: np.ndarray, volume: np.ndarray) -> None:
-        """Find the partners' rows, the vectors and the weights of the bonds, if the rows have changed since."""
+        `facts`: volumes in the first column.
+        """
         self._reference = reference
-        if self._key is not None and np.array_equal(key, self._key):
+        if key is self._key:
             return
         self._key = key
-        self._partner = self._rows_of_partners(c, key)
-        if (self._partner < 0).any():
+        self._partner = self._rows_of_partners(c, key.here)
+        n, width = self._partner.shape
+        if n and self._rows.least(self._partner.reshape(-1))[0] < 0:
             raise Diverged("solid: the partner of a bond is not at hand")
-        n, width = c["bonds"].shape
-        self._bond = np.empty((n, width * (self._dimensions + 1)))
-        bonds = (c["bond_count"], self._partner, self._bond)
-        self._run(n, "weigh", reference, volume, self._size, c["body"], *bonds)
+        self._bond = self._device.empty((n, width * (self._dimensions + 1)))
+        (body,) = c.read("body")
+        self._run(n, "weigh", reference, facts, self._size, body, *self._bonds(c))
 
-    def _rows_of_partners(self, c: dict[str, np.ndarray], key: np.ndarray) -> np.ndarray:
+    def _bonds(self, c: Columns) -> tuple:
+        """How many bonds each particle has, their partners' rows, their vectors and weights."""
+        return *c.read("bond_count"), self._partner, self._bond
+
+    def _rows_of_partners(self, c: Columns, key: np.ndarray) -> Any:
         """(n, width) where the partners' keys stand in `key`; -1: nowhere."""
         order = np.argsort(key, kind="stable")
-        partner = np.zeros(c["bonds"].shape, dtype=np.int32)
-        self._run(len(partner), "find_partners", c["bonds"], c["bond_count"], key[order], order, partner)
+        bonds, count = c.read("bonds", "bond_count")
+        partner = self._device.zeros(bonds.shape, np.int32)
+        sorted_keys = (self._device.array(key[order]), self._device.array(order))
+        self._run(bonds.shape[0], "find_partners", bonds, count, *sorted_keys, partner)
         return partner
 
-    def _fit(self, rows: np.ndarray, c: dict[str, np.ndarray], displacement: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _fit(self, count: int, rows: Any, c: Columns, tension: Any) -> tuple[Any, ...]:
         """Gradient correction, deformation gradient (rows, D D) and moments (rows, 2) of kernels/bonds.py."""
-        fitted = (*np.empty((2, len(rows), self._dimensions**2)), np.empty((len(rows), 2)))
-        bonds = (c["bond_count"], self._partner, self._bond)
-        self._run(len(rows), "fit", rows, *bonds, self._reference, displacement, *fitted)
+        D = self._dimensions
+        fitted = tuple(self._device.empty((count, width)) for width in (D * D, D * D, 2))
+        self._run(count, "fit", rows, *self._bonds(c), self._reference, tension, *fitted)
         return fitted
 
-    def _run(self, count: int, kernel: str, *arguments) -> None:
-        self._team.run(getattr(self._kernels, kernel), count, *arguments)
+    def _run(self, count: int, kernel: str, *arguments: Any) -> None:
+        self._device.run(getattr(self._kernels, kernel), count, *arguments)
 
     # ---- a step -----------------------------------------------------------------------------------------------------
 
-    def asked(self, c: dict[str, np.ndarray]) -> np.ndarray:
+    def asked(self, c: Columns) -> np.ndarray:
         """Keys of the partners that are not among this rank's particles."""
         if c["id"] is not self._ids:
             self._ids, self._key = c["id"], None
-            self._asked = np.unique(c["bonds"][self._rows_of_partners(c, c["id"] * IMAGES) < 0])
+            partner = self._device.get(self._rows_of_partners(c, c["id"] * IMAGES))
+            self._asked = np.unique(c["bonds"][partner < 0])
         return self._asked
 
-    def flags(self, c: dict[str, np.ndarray]) -> list[float]:
+    def flags(self, c: Columns) -> list[float]:
         """Whether any particle has failed, is loose or debris."""
-        return [float(self._failed(c).any() or c["loose"].any() or (c["bond_count"] == 0).any())]
+        bond_count, loose = c.read("bond_count", "loose")
+        n = bond_count.shape[0]
+        mark = self._device.empty(n, np.int8)
+        self._run(n, "mark_parted", bond_count, loose, self._damage(c), mark)
+        return [float(self._rows.any(mark))]
 
-    @staticmethod
-    def _failed(c: dict[str, np.ndarray]) -> np.ndarray:
-        """(n,) whether the material has failed."""
-        return c["damage"] >= 1.0 if "damage" in c else np.zeros(len(c["id"]), dtype=bool)
+    def _damage(self, c: Columns) -> Any:
+        return c.read("damage")[0] if "damage" in c else self._device.empty(0)
 
-    def told(self, c: dict[str, np.ndarray]) -> list:
-        """Reference position; stiffness, displacement and bond stress; the columns VOLUME to DEBRIS."""
-        axes = range(self._dimensions)
+    def told(self, c: Columns) -> list:
+        """Reference position; stiffness, displacement and bond stress; the facts of kernels/bonds.py."""
+        axes, D, n = range(self._dimensions), self._dimensions, c.read("id")[0].shape[0]
         parity = ((), *((a,) for a in axes), *((a, b) for a in axes for b in axes))
-        facts = (c["volume"], c["body"], self._failed(c), c["loose"], c["exposed"], c["bond_count"] == 0)
-        return [(c["reference"], "position"), (self._tension(c), parity), (np.column_stack(facts), ((),) * len(facts))]
+        tension, facts = self._device.empty((n, 1 + D + D * D)), self._device.empty((n, FACTS))
+        material = c.read("density", "sound_speed", "plastic_strain", "deviator", "pressure", "viscous_pressure")
+        shape = c.read("correction", "deformation", "position", "reference", "loose")
+        self._run(n, "stress_bonds", *c.read("body"), self._strength, *material, *shape, self._damage(c), tension)
+        known = c.read("volume", "body", "loose", "exposed", "bond_count")
+        self._run(n, "tell", *known, self._damage(c), facts)
+        return [(*c.read("reference"), "position"), (tension, parity), (facts, ((),) * FACTS)]
 
-    def _tension(self, c: dict[str, np.ndarray]) -> np.ndarray:
-        """(own, 1 + D + D D) what a bond's force needs of a particle, see kernels/bonds.py."""
-        D, n = self._dimensions, len(c["id"])
-        tension = np.empty((n, 1 + D + D * D))
-        material = [c[name] for name in MATERIAL]
-        material += [c["correction"], c["deformation"], c.get("damage", np.empty(0))]
-        self._run(n, "stress_bonds", c["body"], self._strength, *material, tension)
-        tension[c["loose"] > 0] = 0.0  # its bonds no longer determine its strain
-        tension[:, 1 : 1 + D] = c["position"] - c["reference"]
-        return tension
-
-    def accelerate(self, c: dict[str, np.ndarray], near: Near, acceleration: np.ndarray, limits: np.ndarray) -> None:
-        """Collective. Cut bonds that have failed; write the `acceleration` (own, D) of all forces, and the time steps
-        (own, 2) that they allow."""
+    def accelerate(self, c: Columns, near: Near, acceleration: Any, limits: Any) -> None:
+        """Collective. Cut bonds that have failed; add the `acceleration` (own, D) of all forces to none, and write the
+        time steps (own, 2) that they allow."""
         reference, self._tensions, facts = near.told
-        self._place(c, near.plan.key, reference, np.ascontiguousarray(facts[:, VOLUME]))
-        acceleration[:] = 0.0
+        self._place(c, near.plan.key, reference, facts)
         if near.flags[0]:
             self._cut(c, near, facts)
             _, self._tensions, facts = near.plan.exchange(self.told(c))
-            self._debris.push_debris(c, near, np.flatnonzero(facts[:, DEBRIS]), acceleration, limits)
-        bonds = (c["bond_count"], self._partner, self._bond)
-        self._run(near.own, "pull", *bonds, self._tensions, c["volume"], c["mass"], acceleration)
-        marks = facts[:, [BODY, EXPOSED, DEBRIS]].astype(np.int64)
-        marks[:, 0] = self._side(marks[:, 0], near.plan.key)
-        self._contact.find(near, reference, marks, c["bonds"])
-        self._contact.accelerate(c["mass"], acceleration)
-        material = [c[name] for name in ("body", "sound_speed", "viscous_pressure", "density", "deformation")]
-        self._run(near.own, "bound", c["bond_count"], self._size, *material, acceleration, limits)
+            mark = self._device.empty(near.plan.count, np.int8)
+            self._run(near.plan.count, "mark_debris", facts, mark)
+            self._debris.push_debris(c, near, self._rows.marked(mark)[1], acceleration, limits)
+        volume, mass = c.read("volume", "mass")
+        self._run(near.own, "pull", *self._bonds(c), self._tensions, volume, mass, acceleration)
+        self._contact.find(c, near, reference, facts, self._through)
+        self._contact.accelerate(mass, acceleration)
+        material = c.read("body", "sound_speed", "viscous_pressure", "density", "deformation")
+        self._run(near.own, "bound", *c.read("bond_count"), self._size, *material, acceleration, limits)
 
-    def _cut(self, c: dict[str, np.ndarray], near: Near, facts: np.ndarray) -> None:
+    def _cut(self, c: Columns, near: Near, facts: Any) -> None:
         """Cut bonds and fit what is left; a particle that too few bonds hold gets loose for the next step."""
-        marks = [np.ascontiguousarray(facts[:, column]) for column in (FAILED, LOOSE)]
-        bonds = (c["bonds"], c["bond_count"], self._partner, self._bond)
-        lost = np.empty(near.own, dtype=np.int64)
-        self._run(near.own, "cut", near.position, self._reference, *marks, *bonds, lost)
-        rows = np.flatnonzero(lost)
-        displacement = np.ascontiguousarray(self._tensions[:, 1 : 1 + self._dimensions])
-        correction, deformation, moments = self._fit(rows, c, displacement)
-        held = moments[:, 1] > LOOSE_BELOW
-        c["correction"][rows[held]], c["deformation"][rows[held]] = correction[held], deformation[held]
-        c["loose"][rows[~held]] = 1
-        c["exposed"][rows[~(moments[:, 0] >= EXPOSED_BELOW)]] = 1
-        if len(rows):
-            self._contact.forget()
-            self._cut_since_labelled = True
+        lost, mark = self._device.empty(near.own, np.int64), self._device.empty(near.own, np.int8)
+        bonds = (*c.write("bonds", "bond_count"), self._partner, self._bond)
+        self._run(near.own, "cut", near.position, self._reference, facts, *bonds, lost)
+        self._run(near.own, "mark_cut", lost, mark)
+        count, rows = self._rows.marked(mark)
+        if not count:
+            return
+        fitted = self._fit(count, rows, c, self._tensions)
+        kept = c.write("correction", "deformation", "loose", "exposed")
+        self._run(count, "keep_fit", rows, *fitted, LOOSE_BELOW, EXPOSED_BELOW, *kept)
+        self._contact.forget()
+        self._cut_since_labelled = True
 
-    def strain(
-        self, c: dict[str, np.ndarray], near: Near, dt: float, velocity: np.ndarray, gradient: np.ndarray
-    ) -> None:
+    def strain(self, c: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance energy and deformation by `dt` [s] with the old and the new `velocity` (count, D), and write the
         velocity gradient (own, D D) [1/s]; after accelerate()."""
-        gradient[:] = 0.0
         if near.flags[0]:
             self._debris.strain(c, near, dt, velocity, gradient)
-        before = near.state[:, VELOCITY : VELOCITY + self._dimensions]
-        motion = np.hstack([0.5 * (before + velocity), velocity])
-        bonds = (c["bond_count"], self._partner, self._bond)
-        material = [c[name] for name in ("volume", "mass", "correction", "h", "density", "sound_speed")]
-        changed = [c[name] for name in ("deformation", "energy", "viscous_pressure")]
-        self._run(near.own, "stretch", dt, *bonds, self._tensions, motion, *material, *changed, gradient, c["loose"])
-        self._contact.heat(c["mass"], dt, motion, c["energy"])
+        motion = self._device.empty((near.plan.count, 2 * self._dimensions))
+        self._run(near.plan.count, "mean_motion", near.state, velocity, motion)
+        material = c.read("volume", "mass", "correction", "h", "density", "sound_speed")
+        changed = c.write("deformation", "energy", "viscous_pressure")
+        given = (*material, *changed, gradient, *c.write("loose"))
+        self._run(near.own, "stretch", dt, *self._bonds(c), self._tensions, motion, *given)
+        self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
         if near.flags[0] and dt > 0.0:
-            self._open_voids(c, dt, gradient)
-
-    def _open_voids(self, c: dict[str, np.ndarray], dt: float, gradient: np.ndarray) -> None:
-        """Failed particles do not swell: what their surroundings give way is void, and must close again first."""
-        D = self._dimensions
-        rows = np.flatnonzero(self._failed(c) | (c["bond_count"] == 0))
-        divergence = np.einsum("iaa->i", gradient[rows].reshape(-1, D, D))
-        swollen = np.log(c["mass"][rows] / (c["volume"][rows] * c["density"][rows]))
-        whole = swollen + c["void"][rows] + dt * divergence
-        solid = np.minimum(whole, 0.0)
-        c["void"][rows] = whole - solid
-        gradient[rows] += (((solid - swollen) / dt - divergence) / D)[:, None] * np.eye(D).ravel()
+            parted = (*c.read("volume", "mass", "density", "bond_count"), self._damage(c), *c.write("void"), gradient)
+            self._run(near.own, "open_voids", dt, *parted)

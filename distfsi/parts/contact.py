@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Columns
 from distfsi.kernels import contact as kernels
-from distfsi.kernels.solid import DENSITY, MASS, SMOOTHING
+from distfsi.kernels.bonds import DEBRIS
+from distfsi.kernels.solid import SMOOTHING
+from distfsi.mesh.rows import Rows
 from distfsi.parts.neighbours import Near, NeighbourSearch
 
-DRIVERS = (kernels.touch, kernels.heat_contact)
+DRIVERS = (kernels.mark_touching, kernels.remember, kernels.mark_invalid, kernels.touch, kernels.heat_contact)
 SKIN = 0.5  # of a particle's size: how far a search looks beyond particles that touch
 
 
@@ -22,49 +25,57 @@ class Contact:
     a particle are visited in the order of their keys.
     """
 
-    def __init__(self, kernels: SimpleNamespace, team: Team, search: NeighbourSearch, dimensions: int):
-        self._kernels, self._team, self._search, self._dimensions = kernels, team, search, dimensions
+    def __init__(self, kernels: SimpleNamespace, rows: Rows, search: NeighbourSearch, dimensions: int):
+        self._kernels, self._device, self._rows = kernels, rows.device, rows
+        self._search, self._dimensions = search, dimensions
         self.forget()
 
     def forget(self) -> None:
         """Search anew in the next step."""
-        self._who: np.ndarray | None = None
+        self._then: tuple | None = None
 
-    def find(self, near: Near, reference: np.ndarray, facts: np.ndarray, bonds: np.ndarray) -> None:
-        """Find who may touch, with the `reference` positions (count, D) and `facts` (count, 3): body, exposed, debris.
+    def find(self, c: Columns, near: Near, reference: Any, facts: Any, through: Any) -> None:
+        """Find who may touch, with the `reference` positions (count, D), the `facts` (count, 6) of kernels/bonds.py and
+        the axes `through` (bodies,) which bodies go on. Particles with a bond do not touch."""
+        device, count = self._device, near.plan.count
+        size, side, mark = device.empty(count), device.empty(count, np.int64), device.empty(count, np.int8)
+        known = (near.plan.key.there, facts, near.position, size)
+        device.run(self._kernels.mark_touching, count, near.state, facts, known[0], through, size, side, mark)
+        number, rows = self._rows.marked(mark)
+        if not self._still_valid(number, rows, known):
+            self._then = device.empty(number, np.int64), device.empty((number, self._dimensions)), device.empty(number)
+            device.run(self._kernels.remember, number, rows, *known, *self._then)
+            self._table, self._count = self._candidates(c, near, device.get(rows), rows, size, facts)
+        self._among = (rows, self._table, self._count)
+        self._pairs = (near.position, near.state, reference, size, side)
 
-        Particles with a bond do not touch: `bonds` (own, width) holds the keys of partners, -1 for none.
-        """
-        rows = np.flatnonzero(facts[:, 1:].any(axis=1))
-        size = (near.state[:, MASS] / near.state[:, DENSITY]) ** (1.0 / self._dimensions)
-        who = 2 * near.plan.key[rows] + facts[rows, 2]
-        if not self._still_valid(who, near.position[rows], size[rows]):
-            self._who, self._place, self._size = who, near.position[rows], size[rows]
-            self._table, self._count = self._candidates(near, rows, size, facts[rows, 2], bonds)
-        self._among = (rows[: len(self._count)], rows[self._table].astype(np.int32), self._count)
-        self._pairs = (near.position, near.state, reference, size, np.ascontiguousarray(facts[:, 0]))
-
-    def _still_valid(self, who: np.ndarray, place: np.ndarray, size: np.ndarray) -> bool:
-        if self._who is None or not np.array_equal(who, self._who):
+    def _still_valid(self, number: int, rows: Any, known: tuple) -> bool:
+        if self._then is None or self._then[0].shape[0] != number:
             return False
-        closer = np.sqrt(((place - self._place) ** 2).sum(axis=1)) + 0.5 * (size - self._size)
-        return bool((closer <= 0.5 * SKIN * self._size).all())
+        mark = self._device.empty(number, np.int8)
+        self._device.run(self._kernels.mark_invalid, number, SKIN, rows, *known, *self._then, mark)
+        return not self._rows.any(mark)
 
     def _candidates(
-        self, near: Near, rows: np.ndarray, size: np.ndarray, debris: np.ndarray, bonds: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, c: Columns, near: Near, rows: np.ndarray, there: Any, size: Any, facts: Any
+    ) -> tuple[Any, Any]:
         """Table (own, width) and number (own,) of the particles among `rows` that may soon touch each of them.
 
-        Two particles of `debris` (rows,) act on each other otherwise.
+        Two particles of debris act on each other otherwise.
         """
-        key, state = near.plan.key[rows], near.state[rows]
-        reach = (1.0 + SKIN) * size[rows]
+        device = self._device
+        position, key, state, size, facts = (
+            self._rows.taken(array, there) for array in (near.position, near.plan.key.there, near.state, size, facts)
+        )
+        state, debris = device.get(state).copy(), device.get(facts)[:, DEBRIS]
+        reach = (1.0 + SKIN) * device.get(size)
         state[:, SMOOTHING] = 0.5 * reach
         own = int(np.searchsorted(rows, near.own))
         cells = reach.max(initial=np.finfo(float).tiny)
-        self._search.find(own, near.position[rows], state, key, cells)
-        first, place = np.nonzero(np.arange(self._search.table.shape[1]) < self._search.count[:, None])
-        second = self._search.table[first, place]
+        self._search.find(own, position, device.array(state), key, cells)
+        found, key, bonds = device.get(self._search.table), device.get(key), c["bonds"]
+        first, place = np.nonzero(np.arange(found.shape[1]) < device.get(self._search.count)[:, None])
+        second = found[first, place]
         apart = debris[first] * debris[second] == 0
         first, second = first[apart], second[apart]
         free = ~(bonds[rows[first]] == key[second][:, None]).any(axis=1)
@@ -72,16 +83,18 @@ class Contact:
         order = np.lexsort((key[second], first))
         first, second = first[order], second[order]
         count = np.bincount(first, minlength=own)
-        table = np.zeros((own, count.max(initial=0)), dtype=np.int64)
+        table = np.zeros((own, count.max(initial=0)), dtype=np.int32)
         table[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = second
-        return table, count
+        return device.array(table), device.array(count)
 
-    def accelerate(self, mass: np.ndarray, acceleration: np.ndarray) -> None:
+    def accelerate(self, mass: Any, acceleration: Any) -> None:
         """Add the contact forces to the `acceleration` (own, D); after find()."""
-        self._team.run(self._kernels.touch, len(self._count), *self._among, *self._pairs, mass, acceleration)
+        self._device.run(
+            self._kernels.touch, self._count.shape[0], *self._among, *self._pairs, mass, acceleration
+        )  # fmt: skip
 
-    def heat(self, mass: np.ndarray, dt: float, motion: np.ndarray, energy: np.ndarray) -> None:
+    def heat(self, mass: Any, dt: float, motion: Any, energy: Any) -> None:
         """Advance the `energy` (own,) by half the work of the contact forces with the mean velocities `motion`."""
-        self._team.run(
-            self._kernels.heat_contact, len(self._count), *self._among, *self._pairs, mass, dt, motion, energy
-        )
+        self._device.run(
+            self._kernels.heat_contact, self._count.shape[0], *self._among, *self._pairs, mass, dt, motion, energy
+        )  # fmt: skip

@@ -8,22 +8,19 @@ import numpy as np
 
 from distfsi.device.cpu import Team
 from distfsi.kernels import coupling as kernels
-from distfsi.kernels import solid as particle_kernels
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
+from distfsi.parts import search
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
-from distfsi.parts.search import sort_particles
 from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 
 COVER_RADIUS = 1.5  # in cells, of the kernel that decides what is covered; at least three particle spacings
 VELOCITY_RADIUS = 1.4  # in cover radii, of the kernel between particles and cells; at most the ghost cells allow
 PARTICLE_DRIVERS = (
-    particle_kernels.find_cells,
-    particle_kernels.fill_cells,
-    particle_kernels.order_cells,
+    *search.DRIVERS,
     kernels.find_depth,
     kernels.list_cells,
     kernels.find_wall_velocity,
@@ -63,6 +60,8 @@ class Coupling:
         self.reach = min(VELOCITY_RADIUS * self.cover_radius, (GHOSTS + 0.5) * h)
         self._lower, self._upper, self._spacing = (np.array(a) for a in (grid.lower, grid.upper, grid.spacing))
         self._shape = np.array(blocks.shape)
+        D = grid.dimensions
+        self._cells = search.CellSort(self.kernels, team, self._lower[:D], self._upper[:D])
         self._cell_volume = float(self._spacing.prod())
         self._rest = self._state_at_rest(scene)
         self._find_neighbourhood()
@@ -124,9 +123,7 @@ class Coupling:
         """Collective. Find the covered cells, and the velocity of the wall in those that fluxes see."""
         around, blocks, D = self.solid.around, self.blocks, self._dimensions
         position, mass = around["position"], around["mass"]
-        _, bins = sort_particles(
-            self.kernels, self.team, position, around["key"], self._lower[:D], self._upper[:D], self._spacing[:D].min()
-        )
+        _, bins = self._cells.sort(position, around["key"], self._spacing[:D].min())
         lost = np.zeros_like(self._ledger["covered"])
         self.team.run(
             self.fluid_kernels.cover, blocks.local_count, self._kinds, self._occupied, self.fluid.state, lost,

@@ -11,6 +11,7 @@ from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_forces
 from distfsi.kernels.cut_geometry import SHUT
+from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
@@ -62,7 +63,7 @@ class CutCells:
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
         self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
-        self._particles = ParticleExchange(blocks)
+        self._particles = ParticleExchange(blocks, team, team.build(EXCHANGE, {"DIMENSIONS": grid.dimensions}))
         self._lower, self._spacing = np.array(grid.lower), np.array(grid.spacing)
         self._cell_volume = float(self._spacing.prod())
         self._initial = InitialState(scene.fluid, model)
@@ -235,8 +236,8 @@ class CutCells:
             [(start, "position"), (position, "position"), (velocity, vector), (volume, ((),)), (self._own_mass, ((),))]
         )
         self._particle_start, self._particle_velocity, self._mass = start, velocity, mass
-        self._start_bins = wall.sort(start, plan.key)
-        volume, bins = volume[:, None], wall.sort(position, plan.key)
+        self._start_bins = wall.sort(start, plan.key.there)
+        volume, bins = volume[:, None], wall.sort(position, plan.key.there)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((),))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((),))])
         wall.cut(position, volume, ball, bins)

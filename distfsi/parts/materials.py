@@ -9,12 +9,13 @@ means failed: no tension and no shear are left (closed cracks in concrete carry 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
+from distfsi.device.seam import Columns
 from distfsi.physics.concrete import dense_pressure
 from distfsi.scene.description import (
     Body,
@@ -113,12 +114,14 @@ class Materials:
                 toughness[own] = weibull(each.failure.scatter, id[own], volume[own], self.dimensions)
         return toughness
 
-    def state(self, columns: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+    def state(self, columns: Columns) -> list[Any]:
         """The arrays that `deform` reads and writes, in its order; empty ones for what no material needs."""
         names = ("energy", "density", "h", "deviator", "plastic_strain", "temperature", "pressure", "sound_speed")
-        empty = {name: np.empty(0) for name in ("damage", "wear", "toughness", "compression")}
-        empty["stretch"] = np.empty((0, 0))
-        return [columns[name] for name in names] + [columns.get(name, array) for name, array in empty.items()]
+        rare = {"damage": 0, "wear": 0, "toughness": 0, "compression": 0, "stretch": (0, 0)}
+        found = columns.write(*names)
+        for name, shape in rare.items():
+            found += columns.write(name) if name in columns else [columns.device.empty(shape)]
+        return found
 
 
 # ---- rows of constants -----------------------------------------------------------------------------------------------

@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Device
+from distfsi.kernels import rows as row_kernels
+from distfsi.kernels import solid as kernels
 from distfsi.mesh.particles import GhostPlan, Parity
-from distfsi.parts.search import sort_particles
+from distfsi.mesh.rows import Rows
+from distfsi.parts import search
+
+DRIVERS = (*search.DRIVERS, kernels.find_neighbours, kernels.place_among, row_kernels.find_largest)
 
 
 @dataclass
 class Near:
-    """A rank's own particles, then ghosts, then images, as a step finds them.
+    """A rank's own particles, then ghosts, then images, as a step finds them; arrays are the device's.
 
     plan      how values of own particles get to the ghosts and images
     position  (count, D) [m]
@@ -26,10 +32,10 @@ class Near:
     """
 
     plan: GhostPlan
-    position: np.ndarray
-    state: np.ndarray
+    position: Any
+    state: Any
     support: float
-    told: list[np.ndarray]
+    told: list[Any]
     flags: np.ndarray
 
     @property
@@ -51,38 +57,38 @@ class Near:
 class NeighbourSearch:
     """Finds neighbours with a grid of search cells from the corner `lower` to `upper` [m], the same on all ranks.
 
-    table  (own, width) int32: the neighbours of each particle, search cell by search cell, in the order of their keys
+    table  (own, width) int32, on the device: the neighbours of each particle, search cell by search cell, in the order
+           of their keys
     count  (own,): how many there are
     """
 
-    def __init__(self, kernels: SimpleNamespace, team: Team, lower: tuple[float, ...], upper: tuple[float, ...]):
-        self._kernels, self._team = kernels, team
-        self._lower, self._upper = np.array(lower), np.array(upper)
-        self.table = np.empty((0, 4 * 6 ** (len(lower) - 1)), dtype=np.int32)
-        self.count = np.empty(0, dtype=np.int64)
+    def __init__(self, kernels: SimpleNamespace, device: Device, lower: tuple[float, ...], upper: tuple[float, ...]):
+        """`kernels` holds DRIVERS."""
+        self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
+        self._cells = search.CellSort(kernels, device, lower, upper)
+        self._width = 4 * 6 ** (len(lower) - 1)
+        self.table, self.count = device.empty((0, self._width), np.int32), device.empty(0, np.int64)
 
-    def find(self, own: int, position: np.ndarray, state: np.ndarray, key: np.ndarray, size: float) -> None:
+    def find(self, own: int, position: Any, state: Any, key: Any, size: float) -> None:
         """Find the neighbours, closer than h_i + h_j, of the first `own` particles, with search cells of `size` [m]."""
-        cell, cells = sort_particles(self._kernels, self._team, position, key, self._lower, self._upper, size)
-        across = cells.strides[1 : position.shape[1]]  # rows of three cells lie along x
+        cell, cells = self._cells.sort(position, key, size)
+        across = self._cells.strides[1 : position.shape[1]]  # rows of three cells lie along x
         rows = np.array([np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))], dtype=np.int64)
-        search = (position, state, cell, cells.start, cells.order, np.sort(rows))
-        self.count = np.empty(own, dtype=np.int64)
-        width = self.table.shape[1]
-        while width > 0:
-            self.table = np.empty((own, width), dtype=np.int32)
-            self._team.run(self._kernels.find_neighbours, own, *search, self.table, self.count)
-            most = self.count.max(initial=0)
-            width = int(1.2 * most) if most > width else 0
+        near = (position, state, cell, cells.start, cells.order, self._device.array(np.sort(rows)))
+        self.count = self._device.empty(own, np.int64)
+        while True:
+            self.table = self._device.empty((own, self._width), np.int32)
+            self._device.run(self._kernels.find_neighbours, own, *near, self.table, self.count)
+            most = self._rows.largest(self.count, 0)
+            if most <= self._width:
+                return
+            self._width = int(1.2 * most)
 
-    def find_among(
-        self, rows: np.ndarray, own: int, position: np.ndarray, state: np.ndarray, key: np.ndarray, size: float
-    ) -> None:
-        """As find(), of the particles `rows` (ascending) alone; the other particles have no neighbours."""
-        chosen = int(np.searchsorted(rows, own))
-        self.find(chosen, position[rows], state[rows], key[rows], size)
-        table, count = np.zeros((own, self.table.shape[1]), dtype=np.int32), np.zeros(own, dtype=np.int64)
-        inside = np.arange(self.table.shape[1]) < self.count[:, None]
-        table[rows[:chosen]] = rows[np.where(inside, self.table, 0)] if chosen else 0
-        count[rows[:chosen]] = self.count
+    def find_among(self, rows: Any, own: int, position: Any, state: Any, key: Any, size: float) -> None:
+        """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;
+        the others have no neighbours."""
+        chosen = int(np.searchsorted(self._device.get(rows), own))
+        self.find(chosen, *(self._rows.taken(array, rows) for array in (position, state, key)), size)
+        table, count = self._device.empty((own, self._width), np.int32), self._device.zeros(own, np.int64)
+        self._device.run(self._kernels.place_among, chosen, rows, self.table, self.count, table, count)
         self.table, self.count = table, count

@@ -6,20 +6,21 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from distfsi.device.seam import Device
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import GhostPlan
 
 
-def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, communicator: Communicator) -> np.ndarray:
+def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, device: Device, communicator: Communicator) -> np.ndarray:
     """Collective. (own,) the smallest id in the piece of each particle of this rank.
 
     `id` (own + ghosts,); `links` (2, n): rows of bonded pairs. Each rank labels what it knows; where a particle has
     different labels on different ranks, these name one piece.
     """
     local = _smallest(id, links)
-    (told,) = plan.exchange([(local[: plan.own], ((),))])
-    same = np.stack([local, told[: len(id)]], axis=1)
+    (told,) = plan.exchange([(device.array(local[: plan.own].astype(float)), ((),))])
+    same = np.stack([local, device.get(told)[: len(id)].astype(np.int64)], axis=1)
     same = communicator.concatenate(np.unique(same[same[:, 0] != same[:, 1]], axis=0))
     names, ends = np.unique(same, return_inverse=True)
     merged = _smallest(names, ends.reshape(-1, 2).T)

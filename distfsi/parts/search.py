@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Device
+from distfsi.kernels import rows as row_kernels
+from distfsi.kernels import solid as kernels
+from distfsi.mesh.rows import Rows
+
+DRIVERS = (kernels.find_cells, kernels.fill_cells, kernels.order_cells, row_kernels.find_bounds)
 
 
 class SearchCells(NamedTuple):
@@ -21,37 +26,40 @@ class SearchCells(NamedTuple):
     strides  (3,) steps in `start` along each axis
     """
 
-    start: np.ndarray
-    order: np.ndarray
-    lower: np.ndarray
+    start: Any
+    order: Any
+    lower: Any
     size: float
-    low: np.ndarray
-    window: np.ndarray
-    strides: np.ndarray
+    low: Any
+    window: Any
+    strides: Any
 
 
-def sort_particles(
-    kernels: SimpleNamespace,
-    team: Team,
-    position: np.ndarray,
-    key: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    size: float,
-) -> tuple[np.ndarray, SearchCells]:
-    """The search cell of each particle, and the cells, on a grid from `lower` to `upper` (D,) [m].
+class CellSort:
+    """Sorts particles into the cells of grids from `lower` to `upper` (D,) [m]; those outside fall into the cells next
+    to it.
 
-    Particles outside fall into the cells next to it. `kernels` holds find_cells, fill_cells and order_cells.
+    strides  (3,) those of the last window, on the host
     """
-    last = np.ceil((upper - lower) / size)
-    lowest = np.fmin.reduce(position, axis=0, initial=np.inf)
-    highest = np.fmax.reduce(position, axis=0, initial=-np.inf)
-    low, high = np.clip(np.floor((np.stack([lowest, highest]) - lower) / size), -1.0, last)
-    window = np.maximum(high - low, 0.0).astype(np.int64) + 3
-    strides = np.cumprod([1, *window[:-1], *[1] * (3 - len(window))])
-    cell, order = np.empty((2, len(position)), dtype=np.int64)
-    start = np.zeros(window.prod() + 1, dtype=np.int64)
-    team.run(kernels.find_cells, len(position), position, lower, size, low, high, strides, cell)
-    kernels.fill_cells(cell, start, order)
-    team.run(kernels.order_cells, len(start) - 1, start, order, key)
-    return cell, SearchCells(start, order, lower, size, low, window, strides)
+
+    def __init__(self, kernels: SimpleNamespace, device: Device, lower: np.ndarray, upper: np.ndarray):
+        """`kernels` holds DRIVERS."""
+        self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
+        self._lower, self._upper = np.array(lower), np.array(upper)
+        self._corner = device.array(self._lower)
+        self.strides = np.ones(3, dtype=np.int64)
+
+    def sort(self, position: Any, key: Any, size: float) -> tuple[Any, SearchCells]:
+        """The search cell of each particle, and the cells of `size` [m]; `position` (n, D) [m], `key` (n,)."""
+        device, kernels, count = self._device, self._kernels, position.shape[0]
+        last = np.ceil((self._upper - self._lower) / size)
+        low, high = np.clip(np.floor((np.stack(self._rows.bounds(position)) - self._lower) / size), -1.0, last)
+        window = np.maximum(high - low, 0.0).astype(np.int64) + 3
+        self.strides = np.cumprod([1, *window[:-1], *[1] * (3 - len(window))])
+        cell, order = device.empty(count, np.int64), device.empty(count, np.int64)
+        start = device.empty(window.prod() + 1, np.int64)
+        low, high, window, strides = (device.array(a) for a in (low, high, window, self.strides))
+        device.run(kernels.find_cells, count, position, self._corner, size, low, high, strides, cell)
+        device.run_few(kernels.fill_cells, 1, cell, start, order)
+        device.run(kernels.order_cells, start.shape[0] - 1, start, order, key)
+        return cell, SearchCells(start, order, self._corner, size, low, window, strides)

@@ -8,19 +8,22 @@ particles.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.cpu import Team
 from distfsi.device.emit import plain
+from distfsi.device.seam import Columns, Device, Pair
 from distfsi.errors import Diverged
-from distfsi.kernels import material
+from distfsi.kernels import material, motion
+from distfsi.kernels import particles as particle_kernels
+from distfsi.kernels import rows as row_kernels
 from distfsi.kernels import solid as kernels
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
-from distfsi.parts import bonds, pieces, updated
+from distfsi.mesh.rows import Groups
+from distfsi.parts import bonds, neighbours, pieces, updated
 from distfsi.parts.bonds import TotalLagrangian
 from distfsi.parts.materials import Materials
 from distfsi.parts.neighbours import Near, NeighbourSearch
@@ -31,10 +34,14 @@ from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
 
 DRIVERS = (
-    kernels.find_cells,
-    kernels.fill_cells,
-    kernels.order_cells,
-    kernels.find_neighbours,
+    *particle_kernels.EXCHANGE,
+    *neighbours.DRIVERS,
+    row_kernels.find_least,
+    row_kernels.add_rows,
+    motion.collect_state,
+    motion.kick,
+    motion.push,
+    motion.move,
     material.deform,
     *updated.DRIVERS,
     *bonds.DRIVERS,
@@ -46,58 +53,57 @@ LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_li
 class Solid:
     """All particles of this rank. A step is prepare(), time_step(), advance(dt, impulse), migrate().
 
-    columns  this rank's particles, sorted by (block, id): id, body, fixed (n,), position [m], velocity [m/s] (n, D),
-             mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the materials remember
-             (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s], damage (n,) …
-             Velocities belong to half a step before the positions.
+    columns  this rank's particles on host and device, sorted by (block, id): id, body, fixed (n,), position [m],
+             velocity [m/s] (n, D), mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the
+             materials remember (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s],
+             damage (n,) … Velocities belong to half a step before the positions.
+    start    (own, D) [m] positions as of prepare(), on the device
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
 
-    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Team):
+    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = scene.domain.dimensions
-        self.gravity = np.array(scene.gravity)
         self.materials = Materials(scene.solid, self.dimensions)
-        self.exchange = ParticleExchange(blocks)
+        self._tables = [team.array(table) for table in self.materials.tables]
         axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
         self._components = self.dimensions * (self.dimensions + 1) // 2
         constants = {
             "DIMENSIONS": self.dimensions,
             "COMPONENTS": self._components,
+            "GRAVITY": tuple(map(float, scene.gravity)),
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
             "ZERO_ENERGY": scene.solid.zero_energy,
         } | self.materials.constants
         self.kernels = team.build(DRIVERS, constants)
         self._von_mises = plain(von_mises, constants)
+        self.exchange = ParticleExchange(blocks, team, self.kernels)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
         self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(self.kernels, team, search, self.dimensions)
         if scene.solid.form == "total_lagrangian":
-            given = (communicator, scene.solid, self.materials.tables[1], self.dimensions)
-            self.form = TotalLagrangian(self.kernels, team, search, *given)
+            given = (communicator, scene.solid, self._tables[1], self.dimensions)
+            self.form = TotalLagrangian(self.kernels, self.exchange, search, *given)
         self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
         self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
+        self._home: Pair | None = None
         self._own_particles(scene)
 
     def _own_particles(self, scene: Scene) -> None:
         """Pack the bodies and keep the particles of this rank's blocks."""
         columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
         columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-        count = len(columns["body"])
-        columns["id"] = np.arange(count)
-        block = self.blocks.block_of(columns["position"])
-        mine = np.flatnonzero(self.blocks.owners[block] == self.communicator.rank)
-        mine = mine[np.argsort(block[mine], kind="stable")]
+        columns["id"] = np.arange(len(columns["body"]))
+        mine = self.blocks.owners[self.blocks.block_of(columns["position"])] == self.communicator.rank
         c = {name: column[mine] for name, column in columns.items()}
-        n = len(mine)
-        c["energy"] = np.zeros(n)
-        self.columns = c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"])
-        self._find_blocks()
-        self._deform(0.0, np.zeros((n, self.dimensions**2)))
+        c["energy"] = np.zeros(len(c["id"]))
+        self.columns = Columns(self.team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
+        self.migrate()
+        self._deform(0.0, self.team.zeros((len(c["id"]), self.dimensions**2)))
         self.form.bind(self.columns, self.exchange)
 
     def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
@@ -123,25 +129,30 @@ class Solid:
         `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. Raises Diverged on all
         ranks when a smoothing length is not finite.
         """
-        c = self.columns
-        support, *flags = self.communicator.maximum(np.array([c["h"].max(initial=0.0), *self.form.flags(c)]))
+        c, device, own = self.columns, self.team, self.count
+        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
+        support, *flags = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
         support *= 2.0
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
-        state = np.column_stack([c[name] for name in ("mass", "density", "h", "sound_speed", "velocity")])
-        parity = ((),) * kernels.VELOCITY + self._vector
-        plan = self.exchange.ghosts(c["position"], c["id"], max(reach, support), self.form.asked(c))
-        position, state, *told = plan.exchange([(c["position"], "position"), (state, parity), *self.form.told(c)])
+        state, parity = device.empty((own, kernels.VELOCITY + self.dimensions)), ((),) * kernels.VELOCITY
+        device.run(self.kernels.collect_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
+        (self.start,) = c.read("position")
+        plan = self.exchange.ghosts(self.start, c["id"], max(reach, support), self.form.asked(c))
+        given = [(self.start, "position"), (state, parity + self._vector), *self.form.told(c)]
+        position, state, *told = plan.exchange(given)
         self._near = Near(plan, position, state, support, told, flags)
-        self._acceleration, self._limits = np.empty((plan.own, self.dimensions)), np.empty((plan.own, len(LIMITS)))
+        self._acceleration = device.zeros((own, self.dimensions))
+        self._limits = device.empty((own, len(LIMITS)))
         self.form.accelerate(c, self._near, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
         """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare()."""
-        if self._limits.size == 0:
+        if self.count == 0:
             return np.inf, "solid"
-        particle, cause = divmod(int(np.argmin(self._limits)), len(LIMITS))
-        dt = float(self._limits[particle, cause])
+        dt, place = self.exchange.rows.least(self._limits.reshape(-1))
+        particle, cause = divmod(place, len(LIMITS))
+        dt = float(dt)
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {self.columns['id'][particle]}"
 
     def advance(self, dt: float) -> None:
@@ -154,86 +165,76 @@ class Solid:
 
     def kick(self, dt: float) -> None:
         """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
-        c = self.columns
-        mass, fixed = c["mass"][:, None], c["fixed"][:, None]
-        weight = mass * self.gravity * dt
-        received = mass * self._acceleration * dt
-        velocity = np.where(fixed, c["velocity"], c["velocity"] + (received + weight) / mass)
-        mean = 0.5 * (c["velocity"] + velocity)
-        held = -(fixed * (received + weight))  # impulse of what moves the fixed particles
-        self._gravity_work += self._per_block((weight * mean + held * velocity).sum(axis=1, keepdims=True))[:, 0]
-        self._boundary_impulse += self._per_block(received + weight + held)
-        c["velocity"] = velocity
+        c, booked = self.columns, self.team.empty((self.count, 1 + self.dimensions))
+        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), booked)
+        self._run(self.kernels.kick, dt, *given)
+        books = self._per_body(booked).sum(axis=1)
+        self._gravity_work += books[:, motion.WORK]
+        self._boundary_impulse += books[:, motion.IMPULSE :]
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
-        c = self.columns
-        (around,) = self._near.plan.exchange([(c["velocity"], self._vector)])
-        gradient = np.empty((self._near.own, self.dimensions**2))
+        c, device, D = self.columns, self.team, self.dimensions
+        (velocity,) = c.read("velocity")
+        (around,) = self._near.plan.exchange([(velocity, self._vector)])
+        gradient = device.zeros((self.count, D**2))
         self.form.strain(c, self._near, dt, around, gradient)
         self._deform(dt, gradient)
-        c["position"] = c["position"] + dt * c["velocity"]
+        moved = device.empty((self.count, D))
+        self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
+        c.adopt("position", moved)
 
-    def push(self, impulse: np.ndarray) -> np.ndarray:
-        """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s].
+    def push(self, impulse: Any) -> Any:
+        """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
 
-        Returns the gain (own, D) of velocity [m/s]; there is none where particles are fixed.
+        Returns the gain (own, D) of velocity [m/s], another one; there is none where particles are fixed.
         """
-        c = self.columns
-        fixed = c["fixed"][:, None]
-        gain = np.where(fixed, 0.0, impulse / c["mass"][:, None])
-        self.work = self._per_block((impulse * (c["velocity"] + 0.5 * gain)).sum(axis=1, keepdims=True))[:, 0]
-        self.given = self._per_block_and_body(impulse)
-        held = -(fixed * impulse)
-        self._gravity_work += self._per_block((held * c["velocity"]).sum(axis=1, keepdims=True))[:, 0]
-        self._boundary_impulse += self._per_block(held)
-        c["velocity"] = c["velocity"] + gain
+        c, device, D = self.columns, self.team, self.dimensions
+        gain, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
+        self._run(self.kernels.push, impulse, *c.read("mass", "fixed"), *c.write("velocity"), gain, booked)
+        books = self._per_body(booked).sum(axis=1)
+        self.work, self.given = books[:, 0], self._per_body(impulse)
+        self._gravity_work += books[:, 1]
+        self._boundary_impulse += books[:, 2:]
         return gain
 
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
-        self.columns = self.exchange.migrate(self.columns)
-        self._find_blocks()
+        home = self.exchange.migrate(self.columns, self._home)
+        if home is self._home:
+            return
+        self._home, bodies = home, self.given.shape[1]
+        self._block = home.here() - self.blocks.first
+        group = self._block * bodies + self.columns["body"]
+        self._groups = Groups(self.team, self.kernels, group, self.blocks.local_count * bodies)
 
-    def _deform(self, dt: float, gradient: np.ndarray) -> None:
+    def _deform(self, dt: float, gradient: Any) -> None:
         c = self.columns
-        state = self.materials.state(c)
-        self._run(self.kernels.deform, dt, gradient, c["body"], *self.materials.tables, *state)
+        self._run(self.kernels.deform, dt, gradient, *c.read("body"), *self._tables, *self.materials.state(c))
 
-    def _run(self, kernel: Callable, *arguments) -> None:
-        self.team.run(kernel, len(self.columns["id"]), *arguments)
+    def _run(self, kernel: Any, *arguments: Any) -> None:
+        self.team.run(kernel, self.count, *arguments)
 
     # ---- totals and output ------------------------------------------------------------------------------------------
 
-    def _find_blocks(self) -> None:
-        self._block = self.blocks.block_of(self.columns["position"]) - self.blocks.first
-
-    def _per_block(self, values: np.ndarray) -> np.ndarray:
-        """Sums (local blocks, k) of `values` (own, k), particle by particle in the order of their ids."""
-        count = self.blocks.local_count
-        return np.stack([np.bincount(self._block, v, minlength=count) for v in values.T], axis=1)
-
-    def _per_block_and_body(self, values: np.ndarray) -> np.ndarray:
-        """Sums (local blocks, bodies, k) of `values` (own, k), particle by particle in the order of their ids."""
-        bodies = self.given.shape[1]
-        group, count = self._block * bodies + self.columns["body"], self.blocks.local_count * bodies
-        sums = np.stack([np.bincount(group, v, minlength=count) for v in values.T], axis=1)
-        return sums.reshape(-1, bodies, values.shape[1])
-
     @property
-    def start(self) -> np.ndarray:
-        """Positions (own, D) [m] as of prepare()."""
-        return self._near.position[: self._near.own]
+    def count(self) -> int:
+        """Number of this rank's particles."""
+        return self.columns.read("id")[0].shape[0]
+
+    def _per_body(self, values: Any) -> np.ndarray:
+        """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
+        return self._groups.sums(values).reshape(*self.given.shape[:2], values.shape[1])
 
     @property
     def around(self) -> dict[str, np.ndarray]:
         """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, volume, h, key."""
-        s, v = self._near.state, kernels.VELOCITY
+        s, v = self.team.get(self._near.state), kernels.VELOCITY
         scalars = {"mass": kernels.MASS, "density": kernels.DENSITY, "h": kernels.SMOOTHING}
         return {
-            "position": self._near.position,
+            "position": self.team.get(self._near.position),
             "velocity": np.ascontiguousarray(s[:, v : v + self.dimensions]),
-            "key": self._near.plan.key,
+            "key": self._near.plan.key.here,
             "volume": s[:, kernels.MASS] / s[:, kernels.DENSITY],
         } | {name: np.ascontiguousarray(s[:, column]) for name, column in scalars.items()}
 
@@ -252,7 +253,7 @@ class Solid:
         mass, velocity = c["mass"], c["velocity"]
         kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
         values = np.column_stack([mass, kinetic, mass * c["energy"], mass[:, None] * velocity])
-        total = self.blocks.sum(self._per_block(values))
+        total = self.blocks.sum(self._per_body(self.team.array(values)).sum(axis=1))
         return {"mass": total[0], "kinetic": total[1], "internal": total[2], "momentum": total[3:]}
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
@@ -260,7 +261,8 @@ class Solid:
         that the fluid gave to it in the last step."""
         c, D = self.columns, self.dimensions
         mass = c["mass"][:, None]
-        amounts = self._per_block_and_body(np.hstack([mass, mass * c["position"], mass * c["velocity"]]))
+        values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
+        amounts = self._per_body(self.team.array(values))
         total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
         mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
         return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
@@ -289,11 +291,13 @@ class Solid:
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
         sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
-        return {"particles": self.columns, "sums": sums}
+        return {"particles": dict(self.columns), "sums": sums}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Collective. Go on from a snapshot, whose particles may be on any rank."""
-        self.columns = dict(snapshot["particles"])
+        for name, column in snapshot["particles"].items():
+            self.columns[name] = column
+        self._home = None
         self.migrate()
         self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]

@@ -3,80 +3,65 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Columns, Device
 from distfsi.kernels import solid as kernels
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.parts.neighbours import Near, NeighbourSearch
 
-DRIVERS = (kernels.correct, kernels.accelerate, kernels.heat)
+DRIVERS = (kernels.correct, kernels.accelerate, kernels.heat, kernels.press)
 
 
 class UpdatedLagrangian:
     """Forces and strain of the particles that are near each other; of those without neighbours nothing changes."""
 
-    def __init__(self, kernels: SimpleNamespace, team: Team, search: NeighbourSearch, dimensions: int):
-        self._kernels, self._team, self._search, self._dimensions = kernels, team, search, dimensions
+    def __init__(self, kernels: SimpleNamespace, device: Device, search: NeighbourSearch, dimensions: int):
+        self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
 
-    def bind(self, columns: dict[str, np.ndarray], exchange: ParticleExchange) -> None:
+    def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
         """The reference state is of no concern."""
 
-    def label_pieces(self, columns: dict[str, np.ndarray], exchange: ParticleExchange) -> None:
+    def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
         """There are no bonds that make pieces."""
 
-    def asked(self, columns: dict[str, np.ndarray]) -> np.ndarray | None:
+    def asked(self, columns: Columns) -> np.ndarray | None:
         """Keys of particles and images that are needed wherever they are."""
         return None
 
-    def flags(self, columns: dict[str, np.ndarray]) -> list[float]:
+    def flags(self, columns: Columns) -> list[float]:
         """What a rank must know of all others."""
         return []
 
-    def told(self, columns: dict[str, np.ndarray]) -> list:
+    def told(self, columns: Columns) -> list:
         """What ghosts and images must have besides the state, with parities."""
         return []
 
-    def accelerate(
-        self, columns: dict[str, np.ndarray], near: Near, acceleration: np.ndarray, limits: np.ndarray
-    ) -> None:
+    def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Write the `acceleration` (own, D) of the forces and the time steps (own, 2) that they allow."""
-        self._search.find(near.own, near.position, near.state, near.plan.key, near.support)
-        self._act(near, columns["pressure"], columns["deviator"], acceleration, limits)
+        self._search.find(near.own, near.position, near.state, near.plan.key.there, near.support)
+        self._act(near, *columns.read("pressure", "deviator"), acceleration, limits)
 
-    def push_debris(
-        self,
-        columns: dict[str, np.ndarray],
-        near: Near,
-        debris: np.ndarray,
-        acceleration: np.ndarray,
-        limits: np.ndarray,
-    ) -> None:
+    def push_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
         """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure."""
-        self._search.find_among(debris, near.own, near.position, near.state, near.plan.key, near.support)
-        pressure = np.maximum(columns["pressure"], 0.0)
-        self._act(near, pressure, np.zeros_like(columns["deviator"]), acceleration, limits)
+        self._search.find_among(debris, near.own, near.position, near.state, near.plan.key.there, near.support)
+        pressure, deviator = columns.read("pressure", "deviator")
+        pushed = self._device.empty(near.own)
+        self._device.run(self._kernels.press, near.own, pressure, pushed)
+        self._act(near, pushed, self._device.zeros(deviator.shape), acceleration, limits)
 
-    def _act(
-        self,
-        near: Near,
-        pressure: np.ndarray,
-        deviator: np.ndarray,
-        acceleration: np.ndarray,
-        limits: np.ndarray,
-    ) -> None:
-        D, own = self._dimensions, near.own
+    def _act(self, near: Near, pressure: Any, deviator: Any, acceleration: Any, limits: Any) -> None:
+        D, own, run = self._dimensions, near.own, self._device.run
         self._pairs = (near.position, near.state, self._search.table, self._search.count)
-        self._correction, stress = np.empty((2, own, D * D))
-        self._team.run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
+        self._correction, stress = (self._device.empty((own, D * D)) for _ in range(2))
+        run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
         (self._stress,) = near.plan.exchange([(stress, near.matrix)])
-        self._team.run(self._kernels.accelerate, own, *self._pairs, self._stress, acceleration, limits)
+        run(self._kernels.accelerate, own, *self._pairs, self._stress, acceleration, limits)
 
-    def strain(
-        self, columns: dict[str, np.ndarray], near: Near, dt: float, velocity: np.ndarray, gradient: np.ndarray
-    ) -> None:
+    def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance the energy by `dt` [s] with the old and the new `velocity` (count, D), and write the velocity
         gradient (own, D D) [1/s]; after accelerate()."""
-        given = (dt, self._stress, self._correction, velocity, columns["energy"], gradient)
-        self._team.run(self._kernels.heat, len(gradient), *self._pairs, *given)
+        given = (dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
+        self._device.run(self._kernels.heat, near.own, *self._pairs, *given)

@@ -11,17 +11,15 @@ import numpy as np
 from distfsi.device.seam import Device
 from distfsi.kernels import band
 from distfsi.kernels import cut_geometry as kernels
-from distfsi.kernels import solid as particle_kernels
 from distfsi.mesh.blocks import Blocks
-from distfsi.parts.search import SearchCells, sort_particles
+from distfsi.parts import search
+from distfsi.parts.search import SearchCells
 
 SMOOTHING_RADIUS = 1.5  # in cells, of the kernel whose sum gives the distance
 COARSEST = 3.0  # particle spacings that this radius spans at least
 PROFILE_POINTS = 1025
 DRIVERS = (
-    particle_kernels.find_cells,
-    particle_kernels.fill_cells,
-    particle_kernels.order_cells,
+    *search.DRIVERS,
     kernels.fill_kernel,
     kernels.thicken,
     kernels.find_distances,
@@ -75,6 +73,7 @@ class WallGeometry:
         self._distance = np.full((blocks.local_count, *corners), self.radius)
         self._profile = plane_profile(D)
         self._lower, self._upper, self._spacing = (np.array(a) for a in (grid.lower, grid.upper, grid.spacing))
+        self._cells = search.CellSort(self.kernels, team, self._lower[:D], self._upper[:D])
         self.shape, self.cells = np.array(blocks.shape), np.array(grid.cells)
         self.steps = np.array([1, self.shape[2], self.shape[2] * self.shape[1]])
         around = sorted((o for o in product((-1, 0, 1), repeat=D) if any(o)), key=lambda o: (sum(map(abs, o)), o))
@@ -83,11 +82,7 @@ class WallGeometry:
 
     def sort(self, position: np.ndarray, key: np.ndarray) -> SearchCells:
         """Particles by the cells of the grid they are in."""
-        D = self.blocks.grid.dimensions
-        size = float(self._spacing[:D].min())
-        return sort_particles(
-            self.kernels, self.team, position, key, self._lower[:D], self._upper[:D], size
-        )[1]  # fmt: skip
+        return self._cells.sort(position, key, float(self._spacing[: self.blocks.grid.dimensions].min()))[1]
 
     def fill(self, own: int, position: np.ndarray, volume: np.ndarray, bins: SearchCells) -> np.ndarray:
         """Share (own,) of the kernel around each of the first `own` particles that is filled."""

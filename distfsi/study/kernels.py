@@ -48,6 +48,9 @@ class Survey:
     def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
         return _Memory(shape, dtype)
 
+    def zeros(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
+        return _Memory(shape, dtype)
+
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         return np.empty(count, dtype)
 
