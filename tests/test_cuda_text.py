@@ -9,8 +9,9 @@ from distfsi.simulation import Simulation
 from launch import ROOT
 from side_by_side import SideBySide
 
-SERIAL = ("fill_cells",)
-NOT_REACHED = ("cut",)  # of bonds: no particle fails in these scenes
+ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
+# Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
+NOT_REACHED = ("cut", "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
 FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
 SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_forces, cut_geometry)}
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
@@ -24,7 +25,7 @@ def drivers_of(modules) -> set[str]:
     """The names of all drivers that the modules define."""
     functions = [function for module in modules for function in vars(module).values()]
     own = [f for f in functions if getattr(f, "__kind__", "") == "driver" and f.__module__ in map(_name, modules)]
-    return {function.__name__ for function in own} - {*SERIAL, *NOT_REACHED}
+    return {function.__name__ for function in own} - {*ANY_ORDER, *NOT_REACHED}
 
 
 def _name(module) -> str:
@@ -65,7 +66,7 @@ strength = {{ kind = "perfectly_plastic", yield_stress = "1 GPa", shear_modulus 
 
 def steps_side_by_side(monkeypatch, path, steps, overrides=()):
     """The kernels compared in the first steps of a scene."""
-    pair = SideBySide(monkeypatch, SERIAL)
+    pair = SideBySide(monkeypatch, ANY_ORDER)
     simulation = Simulation.of(load(path, overrides), Communicator(), 1)
     for _ in range(steps):
         simulation.step()

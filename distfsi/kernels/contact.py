@@ -14,6 +14,16 @@ IMAGE_BITS = 8  # a key is 8 id + the axes that an image is mirrored along
 SAME_BODY = 0.6  # of the size: lattices that flow plastically do not touch themselves
 
 
+@helper
+def side_of_cube(volume):
+    """What compilers make of a power of 1/2 is not the same on all devices, a root is."""
+    if DIMENSIONS == 1:
+        return volume
+    if DIMENSIONS == 2:
+        return sqrt(volume)
+    return pow(volume, 1.0 / 3.0)
+
+
 @driver
 def mark_touching(begin, end, state, facts, key, through, size, side, mark):
     """mark[i] = 1 for exposed particles and debris, else 0; size[i] [m] of a particle; side[i] = number of its body.
@@ -24,7 +34,7 @@ def mark_touching(begin, end, state, facts, key, through, size, side, mark):
     for i in range(begin, end):
         own = int(facts[i, BODY])
         beyond = key[i] % IMAGE_BITS & (IMAGE_BITS - 1 - through[own]) > 0
-        size[i] = pow(state[i, MASS] / state[i, DENSITY], 1.0 / DIMENSIONS)
+        size[i] = side_of_cube(state[i, MASS] / state[i, DENSITY])
         side[i] = own + (len(through) if beyond else 0)
         mark[i] = 1 if facts[i, EXPOSED] > 0.0 or facts[i, DEBRIS] > 0.0 else 0
 
