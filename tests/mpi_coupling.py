@@ -52,7 +52,7 @@ class Coupled:
 
     def __init__(
         self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64",
-        scheme="paper", cfl=0.4, runge_kutta="rk3",
+        scheme="paper", cfl=0.4, runge_kutta="rk3", form="updated_lagrangian",
     ):  # fmt: skip
         D = len(lower)
         kinds = kinds or (("wall", "wall"),) * D
@@ -63,7 +63,7 @@ class Coupled:
             time=d.Time(1e9, cfl, None, scheme=runge_kutta),
             gravity=(0.0,) * D,
             fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
-            solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form="updated_lagrangian"),
+            solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form=form),
             output=d.Output("", 0.0, 1),
             performance=d.Performance((block,) * D, (block,) * D),
             coupling=d.Coupling(scheme),
@@ -141,10 +141,23 @@ def sinking_plate(threads, block, scheme):
     return Coupled([plate], regions, lower, upper, cells, kinds, block, threads, AIR_AND_WATER, scheme=scheme), 25
 
 
+def stretched_plate(threads, block, scheme):
+    """A plate of bonds, pulled to three times its length across all blocks; gas on one side."""
+    plate = body(d.Box((0.35, -0.1), (0.5, 1.1)), 0.05, 100.0, (0, 0), stiffness=1.0)
+    regions = [(gas(1.0, 1e-2, (0, 0)), None), (gas(1.0, 1.0, (0, 0)), d.Box((0.0, 0.0), (0.4, 1.0)))]
+    case = Coupled(
+        [plate], regions, (0.0, 0.0), (1.0, 1.0), (10, 10), None, block, threads, scheme=scheme, form="total_lagrangian"
+    )
+    c = case.solid.columns
+    c["velocity"][:, 1] = 10.0 * (c["position"][:, 1] - 0.48)
+    return case, 25
+
+
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
-    for scheme, (case, blocks) in product(SCHEMES, ((flying_discs, (4, 7)), (sinking_plate, (3, 4)))):
+    cases = ((flying_discs, (4, 7)), (sinking_plate, (3, 4)), (stretched_plate, (3, 4)))
+    for scheme, (case, blocks) in product(SCHEMES, cases):
         digests = []
         for threads, block in ((1, blocks[0]), (2, blocks[1])):
             coupled, steps = case(threads, block, scheme)
@@ -155,7 +168,9 @@ def main():
             ledger = coupled.coupling.ledger()
             assert np.abs(coupled.balance() - before).max() < 1e-12 * scale
             made = {cause: np.abs(amounts[-1]) for cause, amounts in ledger.items()}
-            if scheme == "paper":
+            if case is stretched_plate:  # it reaches through the ends of the domain, and pushes against them
+                assert all(np.isfinite(amount) for amount in made.values())
+            elif scheme == "paper":
                 assert all(made[cause] > 0.0 for cause in ("wall", "covered", "fresh"))
             else:
                 assert made["wall"] < 1e-12 * scale

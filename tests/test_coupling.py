@@ -188,5 +188,5 @@ def one_rank():
 
 @pytest.mark.parametrize("ranks", [2, 4])
 def test_same_bits_on_any_number_of_ranks_and_threads_and_for_any_blocks(one_rank, ranks):
-    assert one_rank.count("\n") == 4
+    assert one_rank.count("\n") == 6
     assert run_ranks(ranks, ["tests/mpi_coupling.py"], 300) == one_rank

@@ -269,6 +269,21 @@ def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(monkeypatch, thi
         assert mass / before - 1.0 < 1e-12 and 1.0 - (mass + shut_in) / before < 1e-12
 
 
+def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold():
+    """To 3.5 times its length, so that its particles are 1.75 cells apart; pressure 1e4 : 1."""
+    plate = rigid(Box((0.4, -0.2), (0.525, 1.2)), 1.0 / 32, (0.0, 0.0))
+    regions = [(gas(1e-3, 1e-4, (0, 0)), None), (gas(1.0, 1.0, (0, 0)), Box((0.0, 0.0), (0.45, 1.0)))]
+    case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (16, 16), block=16, form="total_lagrangian")
+    c = case.solid.columns
+    c["velocity"][:, 1] = 10.0 * (c["position"][:, 1] - 0.48)
+    before = low_side(case)[0]
+    while case.simulation.time < 0.25:
+        case.step()
+        mass, shut_in, open_way = low_side(case)
+        assert not open_way
+    assert abs(mass + shut_in - before) < 1e-12 * before
+
+
 # ---- restart --------------------------------------------------------------------------------------------------------
 
 

@@ -15,11 +15,12 @@ from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
-from distfsi.mesh.particles import ParticleExchange
+from distfsi.mesh.particles import GhostPlan, ParticleExchange
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
 from distfsi.parts.solid import Solid
 from distfsi.parts.wall_geometry import WallGeometry
+from distfsi.parts.wall_points import wall_points
 from distfsi.scene.description import Scene
 
 MIRRORS = ("symmetry", "wall", "outflow", "inflow")
@@ -78,8 +79,8 @@ class CutCells:
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         self._find_sides()
         c = solid.columns
-        self._cut(c["position"], c["position"], np.zeros_like(c["velocity"]))
-        self._cut(c["position"], c["position"], np.zeros_like(c["velocity"]))
+        self._cut(c["position"], np.zeros_like(c["velocity"]))
+        self._cut(c["position"], np.zeros_like(c["velocity"]))
         self._fill_at_start()
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
@@ -129,7 +130,7 @@ class CutCells:
     def follow(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         c, D = self.solid.columns, self._dimensions
-        self._cut(self.solid.start, c["position"], c["velocity"])
+        self._cut(self.solid.start, c["velocity"])
         self._find_company()
         n = len(self._band)
         self._area, self._velocity = np.empty((2, n, D))
@@ -221,26 +222,29 @@ class CutCells:
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
-    def _cut(self, start: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> None:
-        """The cells cut by this rank's particles and those around, which have moved from `start` to `position`."""
+    def _cut(self, start: np.ndarray, velocity: np.ndarray) -> None:
+        """The cells cut by this rank's particles and those around, which have moved from `start` with `velocity`."""
         c, D, wall = self.solid.columns, self._dimensions, self.wall
         vector = tuple((a,) for a in range(D))
-        volume = c["mass"] / c["density"]
-        self._own_mass = np.where(self._part_inside(start, volume) > 0.0, c["mass"], 0.0)
-        volume = volume * self._part_inside(position, volume)
-        images = wall.search + 0.5 * self._spacing[:D].max()
-        self._plan = plan = self._particles.ghosts(
-            start, c["id"], wall.reach, image_reach=images, mirrors=MIRRORS
-        )  # fmt: skip
-        start, position, velocity, volume, mass = plan.exchange(
-            [(start, "position"), (position, "position"), (velocity, vector), (volume, ((),)), (self._own_mass, ((),))]
+        self._own_mass = np.where(self._part_inside(start, c["mass"] / c["density"]) > 0.0, c["mass"], 0.0)
+        point, volume, number = wall_points(c, float(self._spacing[:D].max()))
+        volume = volume * self._part_inside(point, volume)
+        self._plan = self._ghosts(start, c["id"])
+        self._particle_start, self._particle_velocity, self._mass = self._plan.exchange(
+            [(start, "position"), (velocity, vector), (self._own_mass, ((),))]
         )
-        self._particle_start, self._particle_velocity, self._mass = start, velocity, mass
-        self._start_bins = wall.sort(start, plan.key.there)
+        self._start_bins = wall.sort(self._particle_start, self._plan.key.there)
+        plan = self._plan if number is c["id"] else self._ghosts(point, number)
+        position, volume = plan.exchange([(point, "position"), (volume, ((),))])
         volume, bins = volume[:, None], wall.sort(position, plan.key.there)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((),))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((),))])
         wall.cut(position, volume, ball, bins)
+
+    def _ghosts(self, position: np.ndarray, id: np.ndarray) -> GhostPlan:
+        """Collective. Who needs copies of which particles or points."""
+        images = self.wall.search + 0.5 * self._spacing[: self._dimensions].max()
+        return self._particles.ghosts(position, id, self.wall.reach, image_reach=images, mirrors=MIRRORS)
 
     def _part_inside(self, position: np.ndarray, volume: np.ndarray) -> np.ndarray:
         """Part (n,) of the cubes of `volume` (n,) around the positions (n, D) that is in the domain."""
@@ -367,7 +371,7 @@ class CutCells:
         self._through_sides[:] = snapshot["sums"]["sides"]
         c = self.solid.columns
         self.wall.near[:] = 1
-        self._cut(c["position"], c["position"], c["velocity"])
+        self._cut(c["position"], c["velocity"])
 
     def ledger(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
