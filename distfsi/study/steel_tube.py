@@ -1,7 +1,12 @@
-"""The steel tube beside its references: wall speed and radius with strength off, and what strength costs."""
+"""The steel tube beside its references, up to four times its radius: wall speed and radius, and what strength costs.
+
+The bonds of the total Lagrangian form decide where the wall is open, so that it stays whole where its particles are far
+apart; failure is off.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +16,29 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.scene import load
 from distfsi.simulation import run
-from distfsi.study.references import STEEL_TUBE
+from distfsi.study.references import STEEL_TUBE, STEEL_TUBE_JOHNSON_COOK, STEEL_TUBE_PLASTIC, TubeStrength
 
+DIRECTORY = Path("out/study_steel_tube")
 INPUT = Path(__file__).parents[2] / "inputs" / "steel_tube.toml"
+WIDE = (  # room for 60 us; eight particles across the wall
+    "solid.form=total_lagrangian",
+    "domain.upper=[0.14,0.14]",
+    "domain.cells=[140,140]",
+    'solid.bodies.tube.spacing="0.5 mm"',
+    'time.end="60 us"',
+    'output.fields_every="5 us"',
+)
+PLASTIC = '{kind="perfectly_plastic",shear_modulus="80 GPa",yield_stress="1 GPa"}'
+STRENGTHS: dict[str, tuple[tuple[str, ...], Sequence[TubeStrength]]] = {
+    "without strength": (("solid.bodies.tube.strength=none",), ()),
+    "plastic, 1 GPa": ((f"solid.bodies.tube.strength={PLASTIC}",), STEEL_TUBE_PLASTIC),
+    "Johnson-Cook": ((), STEEL_TUBE_JOHNSON_COOK),
+}
 
 
 @dataclass(frozen=True)
@@ -52,10 +73,17 @@ def _wall(time, path, cells, first, last, spacing, rings) -> Wall:
     low = r[first].mean() - 0.5 * spacing * rings[0] / r[first].mean()
     high = r[last].mean() + 0.5 * spacing * rings[-1] / r[last].mean()
     velocity = float(np.mean(np.sum(v * x, axis=1) / r))
+    return Wall(time, low, high - low, velocity, _pieces(particles, spacing), _products_outside(cells, high))
+
+
+def _pieces(particles: dict[str, np.ndarray], spacing: float) -> int:
+    """What intact bonds hold together; without bonds, what is nearer than the support of the input's kernel."""
+    if "piece" in particles:
+        return len(np.unique(particles["piece"]))
+    x = particles["position"][:, :2]
     pairs = cKDTree(x).query_pairs(2.0 * spacing * 1.3, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(x), len(x)))
-    pieces = connected_components(links, directed=False, return_labels=False)
-    return Wall(time, low, high - low, velocity, int(pieces), _products_outside(cells, high))
+    return int(connected_components(links, directed=False, return_labels=False))
 
 
 def _products_outside(path: Path, radius: float) -> float:
@@ -90,18 +118,80 @@ def table(found: list[Wall]) -> str:
     return "\n".join(lines)
 
 
-def main(communicator: Communicator, overrides: list[str]) -> None:
-    """Run the tube without and with strength and print both beside the reference."""
-    energies, tables = {}, {}
-    for name, strength in (("without strength", ["solid.bodies.tube.strength=none"]), ("Johnson-Cook", [])):
-        directory = Path("out/study_steel_tube") / name.replace(" ", "_")
-        scene = load(INPUT, [*strength, "output.fields_every=2.5e-6", f'output.directory="{directory}"', *overrides])
-        run(scene, communicator)
-        if communicator.rank == 0:
-            tables[name] = table(walls(directory))
-            energies[name] = read_history(directory / "history.csv")["solid kinetic energy [J]"][-1]
-    if communicator.rank == 0:
-        for name, text in tables.items():
-            print(f"\n{name} (in brackets: 1-D reference without strength)\n{text}")
-        without, with_strength = energies.values()
-        print(f"\nkinetic energy at the end: {100 * (with_strength / without - 1):+.1f} % with Johnson-Cook strength")
+@dataclass(frozen=True)
+class Expansion:
+    """A run of the tube: its wall over time, and the kinetic energy [J] of the quarter at times [s]."""
+
+    walls: list[Wall]
+    time: np.ndarray
+    kinetic: np.ndarray
+
+    def lost(self, whole: Expansion, time: float | np.ndarray) -> float | np.ndarray:
+        """Share of the kinetic energy that this wall lacks beside a `whole` one without strength."""
+        return 1.0 - np.interp(time, self.time, self.kinetic) / np.interp(time, whole.time, whole.kinetic)
+
+
+def expand(communicator: Communicator, name: str, overrides: Sequence[str]) -> Expansion | None:
+    """Collective. Run the tube with a strength; None on all ranks but the first."""
+    directory = DIRECTORY / name.replace(" ", "_").replace(",", "")
+    scene = load(INPUT, [*WIDE, *STRENGTHS[name][0], f'output.directory="{directory}"', *overrides])
+    run(scene, communicator)
+    if communicator.rank > 0:
+        return None
+    history = read_history(directory / "history.csv")
+    return Expansion(walls(directory), history["time [s]"], history["solid kinetic energy [J]"])
+
+
+def losses(name: str, found: Expansion, whole: Expansion) -> str:
+    """What strength costs, beside the reference."""
+    lines = ["   t       r_in [mm]              v [m/s]         kinetic energy lost [%]"]
+    for reference in STRENGTHS[name][1]:
+        wall = min(found.walls, key=lambda w: abs(w.time - reference.time))
+        if abs(wall.time - reference.time) < 1e-7:
+            lines.append(
+                f"{1e6 * wall.time:5.1f} us  {1e3 * wall.inner_radius:6.2f} ({1e3 * reference.inner_radius:6.2f})"
+                f"      {wall.velocity:5.0f} ({reference.mean_velocity:5.0f})"
+                f"      {100 * found.lost(whole, wall.time):5.2f} ({100 * reference.loss:5.2f})"
+            )
+    return "\n".join(lines)
+
+
+def charts(found: dict[str, Expansion]) -> list[Chart]:
+    """Radius, velocity and lost energy over time, with the points of the references."""
+    whole = next(iter(found.values()))
+    radius, velocity, loss = [], [], []
+    for name, tube in found.items():
+        points = STRENGTHS[name][1] or STEEL_TUBE
+        time, at = 1e6 * np.array([w.time for w in tube.walls]), 1e6 * np.array([p.time for p in points])
+        radius.append(Curve(time, 1e3 * np.array([w.inner_radius for w in tube.walls]), name))
+        velocity.append(Curve(time, np.array([w.velocity for w in tube.walls])))
+        late = tube.time > 1e-6
+        loss.append(Curve(1e6 * tube.time[late], 100 * tube.lost(whole, tube.time[late])))
+        radius.append(Curve(at, 1e3 * np.array([p.inner_radius for p in points]), None, "ok"))
+        velocity.append(Curve(at, np.array([p.mean_velocity for p in points]), None, "ok"))
+        loss.append(Curve(at, 100 * np.array([getattr(p, "loss", 0.0) for p in points]), None, "ok"))
+    return [
+        Chart("dots: one-dimensional computations", "time [us]", "inner radius [mm]", radius),
+        Chart("", "time [us]", "mean wall velocity [m/s]", velocity),
+        Chart("", "time [us]", "kinetic energy lost [%]", loss),
+    ]
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Run the tube without and with strength; print all beside the references, and leave charts in DIRECTORY."""
+    found = {name: expand(communicator, name, overrides) for name in STRENGTHS}
+    if communicator.rank > 0:
+        return
+    whole = next(iter(found.values()))
+    for name, tube in found.items():
+        print(f"\n{name} (in brackets: 1-D reference without strength)\n{table(tube.walls)}")
+        if STRENGTHS[name][1]:
+            print(f"beside the 1-D reference with strength\n{losses(name, tube, whole)}")
+    draw_charts(DIRECTORY / "tube.png", charts(found), columns=3)
+    print(f"\nruns and charts in {DIRECTORY}", flush=True)
+
+
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """The same on few cells up to 5 us."""
+    coarse = ("domain.upper=[0.07,0.07]", "domain.cells=[35,35]", 'solid.bodies.tube.spacing="1 mm"', 'time.end="5 us"')
+    main(communicator, [*coarse, *overrides])
