@@ -219,8 +219,8 @@ def smaller(old, new, at):
 
 @helper
 def is_needy(fraction_old, fraction_new, swept, at, share):
-    """Whether the fluid in a cell has to join a neighbour's."""
-    return smaller(fraction_old, fraction_new, at) < NEEDY or load(swept, share) <= 0.0
+    """Whether the fluid in a cell has to join a neighbour's: it has little room, or fills little of it."""
+    return min(smaller(fraction_old, fraction_new, at), load(swept, share)) < NEEDY
 
 
 @helper
