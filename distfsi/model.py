@@ -13,7 +13,7 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
-from distfsi.physics import euler, five_equation, limiters, positivity, riemann, two_phase
+from distfsi.physics import euler, five_equation, limiters, positivity, reconstruction, riemann, two_phase
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
@@ -117,6 +117,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
+        "GHOSTS": 2,
+        "SHARPENED": fluid.sharpening,
+        "CURVED": False,
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme == "cut_cells",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
@@ -125,6 +128,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     bindings["state_behind_wave"] = Bound(model.behind_wave)
     bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
     bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
+    bindings["reconstructed"] = Bound(reconstruction.muscl)
+    bindings["sharpened"] = Bound(reconstruction.overbee)
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )

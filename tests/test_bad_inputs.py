@@ -59,6 +59,7 @@ BROKEN = [
     (changed(SOD, ("gamma", "gamma = 1")), ["must be > 1"]),
     (changed(SOD, ("gamma", "gama = 1.4")), ["did you mean 'gamma'?"]),
     (changed(SOD, ("phase", 'phase = "gsa"')), ["did you mean 'gas'?"]),
+    (changed(SOD, ("[fluid.phases", "[fluid]\nsharpening = true\n[fluid.phases.gas]")), ["needs an interface"]),
     (changed(SOD, ("density", "density = 0")), ["must be > 0"]),
     (changed(SOD, ("density", 'density = "1 kg"')), ["has units kg, needs kg/m3"]),
     (changed(SOD, ("pressure", "")), ["give either pressure or energy"]),

@@ -46,7 +46,7 @@ CASES = {
     "1D explosive and gas": (("tnt", "air"), 1, {"reconstruction": "van_leer", "riemann": "hll"}),
     "2D gas": (("air",), 2, {"riemann": "adaptive"}),
     "2D gas, float32, first order": (("air",), 2, {"precision": "float32", "reconstruction": "first_order"}),
-    "2D water and gas": (("water", "air"), 2, {"riemann": "adaptive"}),
+    "2D water and gas": (("water", "air"), 2, {"riemann": "adaptive", "sharpening": True}),
     "3D gas": (("air",), 3, {}),
 }
 LONG = {

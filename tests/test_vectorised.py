@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"
 )
 
-ROWS = (fluid.primitives_row, fluid.slopes_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
+ROWS = (fluid.primitives_row, fluid.rises_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
 REALS = ("cx", "cy", "cz", "rate", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
@@ -25,13 +25,18 @@ SCENES = {
     "air-3D": (("air",), 3, "float64"),
     "products-air-2D-single": (("tnt", "air"), 2, "float32"),
 }
-RIEMANN = {"water-air-2D": "hllc", "products-air-3D": "adaptive", "air-3D": "adaptive", "products-air-2D-single": "hll"}
+METHOD = {
+    "water-air-2D": {"riemann": "hllc", "sharpening": True},
+    "products-air-3D": {"riemann": "adaptive"},
+    "air-3D": {"riemann": "adaptive"},
+    "products-air-2D-single": {"riemann": "hll"},
+}
 WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
 
 def module_text(row, scene):
     names, dimensions, real = SCENES[scene]
-    model = model_of(*names, dimensions=dimensions, limiter="van_leer", riemann=RIEMANN[scene])
+    model = model_of(*names, dimensions=dimensions, limiter="van_leer", **METHOD[scene])
     return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
 
 
@@ -65,7 +70,7 @@ def test_rows_are_packed(row, scene):
     own, other = ("d", "s") if real == "float64" else ("s", "d")
     code = machine_code(row, module_text(row, scene), real)
     bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
-    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.slopes_row else 1
+    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.rises_row else 1
     assert len(bodies) >= loops
     assert sum(count(body, "mul|div|sqrt", "s" + own, ["xmm"]) for body in bodies) == 0
     for operation in ("mul", "div", "sqrt"):

@@ -8,7 +8,7 @@ A cell is named by its flat index `at` in a field of one variable: block * (cell
 from math import floor
 
 from distfsi.device.markers import driver, helper, load, real, store, workspace
-from distfsi.kernels.fluid import face_fluxes, place, primitives_row, slopes_row
+from distfsi.kernels.fluid import face_fluxes, place, primitives_row, rises_row
 from distfsi.kernels.gather import any_particle, sum_particles
 from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
@@ -207,7 +207,7 @@ def fill_deep(begin, end, deep, U, shape, rest):
 
 @helper
 def look_at_face(U, at, cells, steps, axis, P, T):
-    """P, T = primitives and slopes around the face between a cell `at` and the next along `axis`, by the stage's rows.
+    """P, T = primitives and rises around the face between a cell `at` and the next along `axis`, by the stage's rows.
 
     P holds five lines of four cells: the one through the face, and those beside it if the flux looks there.
     """
@@ -220,7 +220,7 @@ def look_at_face(U, at, cells, steps, axis, P, T):
             for c in range(1, 3):
                 primitives_row(U, P, first + (c - 1) * step - beside, cells, LINE + c - 4 * d, BOX, 1)
                 primitives_row(U, P, first + (c - 1) * step + beside, cells, LINE + c + 4 * d, BOX, 1)
-    slopes_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
+    rises_row(P, T, LINE + 1, BOX, 1, 0, 2, 2)
 
 
 @helper

@@ -1,6 +1,6 @@
 // The loops of kernels/fluid.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
 // ---- tuples and arrays ------------------------------------------------------------------------------------------------
@@ -40,9 +40,9 @@ DEVICE constexpr int place(int v, int axis)
 
 // ---- a tile in shared memory ------------------------------------------------------------------------------------------
 
-constexpr int GY = DIMENSIONS > 1 ? 2 : 0, GZ = DIMENSIONS > 2 ? 2 : 0;
-constexpr int PX = TILE_X + 4, PY = TILE_Y + 2 * GY, PLANE = PX * PY;
-constexpr int SLOTS = DIMENSIONS > 2 ? 4 : 1;  // planes of cells that are kept: a flux along z reads four
+constexpr int GY = DIMENSIONS > 1 ? GHOSTS : 0, GZ = DIMENSIONS > 2 ? GHOSTS : 0;
+constexpr int PX = TILE_X + 2 * GHOSTS, PY = TILE_Y + 2 * GY, PLANE = PX * PY;
+constexpr int SLOTS = DIMENSIONS > 2 ? 2 * GHOSTS : 1;  // planes of cells that are kept: those a flux along z reads
 constexpr int SP = SLOTS * PLANE;
 constexpr int ROW = TILE_X + 1;  // of faces
 constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
@@ -51,7 +51,7 @@ constexpr real LEAST_VOLUME = HALF;
 static_assert(SHARED == VARIABLES * SP + FLUXES * FACES && THREADS == TILE_X * TILE_Y, "what the launch assumes");
 
 // P of a cell of the tile; k counts planes, of which the last SLOTS are there.
-DEVICE int cell(int i, int j, int k) { return (SLOTS > 1 ? (k + 4) % SLOTS : 0) * PLANE + (j + GY) * PX + i + 2; }
+DEVICE int cell(int i, int j, int k) { return (SLOTS > 1 ? (k + SLOTS) % SLOTS : 0) * PLANE + (j + GY) * PX + i + GHOSTS; }
 
 template <int AXIS> DEVICE int cell_along(int i, int j, int k, int steps)
 {
@@ -75,20 +75,29 @@ template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int
     return jump;
 }
 
+// How far variable v rises from the low face of a cell to its mean and from there to its high face.
+template <int AXIS> DEVICE auto rises(const real *W, bool sharp, int i, int j, int k)
+{
+    real values[2 * GHOSTS - 1];
+#pragma unroll
+    for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = W[cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
+    const auto cells = tuple_of<2 * GHOSTS - 1>(values);
+    return SHARPENED && sharp ? sharpened(cells) : reconstructed(cells);
+}
+
 // Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
 // cell * dt/h. Whether it was limited.
 template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real rate, real *F, int step)
 {
     real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
-    const int before = cell_along<AXIS>(i, j, k, -1), low = cell(i, j, k);
-    const int high = cell_along<AXIS>(i, j, k, 1), after = cell_along<AXIS>(i, j, k, 2);
+    const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
         const real *W = P + rotated(v, AXIS) * SP;
-        const real difference = W[high] - W[low];
+        const bool sharp = v == VARIABLES - 1;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + HALF * limited_slope(W[low] - W[before], difference);
-        right[v] = W[high] - HALF * limited_slope(difference, W[after] - W[high]);
+        left[v] = W[low] + item<1>(rises<AXIS>(W, sharp, i, j, k));
+        right[v] = W[high] - item<0>(rises<AXIS>(W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
     if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
@@ -107,7 +116,7 @@ template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real ra
 DEVICE void load_plane(const real *U, real *P, int k, int n, int m, int tx, int ty, long long sy, long long sz, long long su)
 {
     for (int j = ty - GY; j < m + GY; j += TILE_Y) {
-        for (int i = tx - 2; i < n + 2; i += TILE_X) {
+        for (int i = tx - GHOSTS; i < n + GHOSTS; i += TILE_X) {
             const real *u = U + k * sz + j * sy + i;
             real state[VARIABLES];
 #pragma unroll
@@ -161,8 +170,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const bool is_calm = calm[t];
     bool uniform = is_calm;
     if (!is_calm) {
-        const real *corner = U + u0 - GZ * sz - GY * sy - 2;
-        const bool unlike = is_unlike(corner, corner, nx + 4, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
+        const real *corner = U + u0 - GZ * sz - GY * sy - GHOSTS;
+        const bool unlike = is_unlike(corner, corner, nx + 2 * GHOSTS, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
                             || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
         uniform = __syncthreads_count(unlike) == 0;
     }
@@ -187,7 +196,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         __syncthreads();
     }
     for (int k = 0; k < l; k++) {
-        if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + 2, n, m, tx, ty, sy, sz, su);
+        if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
                 count += flux<0>(P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;

@@ -3,12 +3,12 @@
 A tile is computed row by row (x fastest), so that its working set stays in the cache:
 
     primitives of the tile and its ghosts -> P
-    for each row:  slopes and fluxes along x; along y and z those of the row above roll forward
+    for each row:  rises and fluxes along x; along y and z those of the row above roll forward
                    divergence, Runge-Kutta update and relaxation -> U_new
 
 Where all cells that a tile reads hold the same state, all its cells get the same bits: it is computed as one cell.
 
-P holds one box of (pz, py, px) values per variable; rows of slopes and fluxes hold px values per variable. Flux rows
+P holds one box of (pz, py, px) values per variable; rows of rises and fluxes hold px values per variable. Flux rows
 have their velocity components rotated so that the normal one comes first.
 """
 
@@ -17,18 +17,22 @@ from math import sqrt
 from distfsi.device.markers import ByHand, driver, helper, load, real, row, store, workspace
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
+    CURVED,
     DIMENSIONS,
     FLUXES,
     FRACTIONAL,
+    GHOSTS,
     LOOKS_SIDEWAYS,
     PHASES,
+    SHARPENED,
     VARIABLES,
     face_flux,
     is_admissible,
     limited_flux,
-    limited_slope,
     primitives,
+    reconstructed,
     reserve,
+    sharpened,
     sound_speed,
     updated,
 )
@@ -65,14 +69,24 @@ def primitives_row(U, P, u, su, p, sp, n):
             store(P, p + v * sp + i, W[v])
 
 
+@helper
+def low_rise(v):
+    """Row of T with the rise of variable v from a cell's low face to its mean; that on to its high face is in row v."""
+    return v + VARIABLES if CURVED else v
+
+
 @row
-def slopes_row(P, T, p, sp, step, t, st, n):
-    """T[t …] = half the limited slope of each primitive along the axis whose cells are `step` apart."""
+def rises_row(P, T, p, sp, step, t, st, n):
+    """T[t …] = by how much each primitive of the n cells rises from the mean to the high face along the axis whose
+    cells are `step` apart, then where it differs from the low face to the mean."""
     for v in static_range(VARIABLES):
         for i in range(n):
             c = p + v * sp + i
-            here = load(P, c)
-            store(T, t + v * st + i, 0.5 * limited_slope(here - load(P, c - step), load(P, c + step) - here))
+            cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
+            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else reconstructed(cells)
+            store(T, t + v * st + i, high)
+            if CURVED:
+                store(T, t + low_rise(v) * st + i, low)
 
 
 @helper
@@ -113,7 +127,7 @@ def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, r
     for i in range(n):
         low, high = cell_mean(P, p + i, sp, axis), cell_mean(P, p + step + i, sp, axis)
         left = tuple(low[v] + load(T, t_low + rotated(v, axis) * st + i) for v in static_range(VARIABLES))
-        right = tuple(high[v] - load(T, t_high + rotated(v, axis) * st + i) for v in static_range(VARIABLES))
+        right = tuple(high[v] - load(T, t_high + low_rise(rotated(v, axis)) * st + i) for v in static_range(VARIABLES))
         flux = face_flux(left, right, jump_of_face(P, p + i, sp, step, side_1, side_2))
         for v in static_range(FLUXES):
             store(F, f + v * st + i, flux[v])
@@ -248,16 +262,18 @@ def book(through, t, side, F, f, step, st, axis, n, rows, weight):
 
 
 STAGE_FORMULAS = (
-    "primitives", "limited_slope", "face_flux", "sound_speed", "reserve", "is_admissible", "limited_flux", "updated",
+    "primitives", "reconstructed", "sharpened", "face_flux", "sound_speed", "reserve", "is_admissible", "limited_flux",
+    "updated",
 )  # fmt: skip
 
 
 def stage_block(constants, arguments):
-    """A thread per column of a tile; shared memory holds primitives of the tile, in 3D of four planes, and fluxes."""
+    """A thread per column of a tile; shared memory holds fluxes and primitives of the tile, in 3D of some planes."""
     D = constants["DIMENSIONS"]
     px, py = int(arguments["px"]), int(arguments["py"])
-    x, y = px - 4, py - (4 if D > 1 else 0)
-    cells, faces = px * py * (4 if D > 2 else 1), (x + 1) * (y + (1 if D > 1 else 0))
+    g = constants["GHOSTS"]
+    x, y = px - 2 * g, py - (2 * g if D > 1 else 0)
+    cells, faces = px * py * (2 * g if D > 2 else 1), (x + 1) * (y + (1 if D > 1 else 0))
     shared = constants["VARIABLES"] * cells + constants["FLUXES"] * faces
     return {"TILE_X": x, "TILE_Y": y, "THREADS": x * y, "SHARED": shared}
 
@@ -281,13 +297,13 @@ def advance_tiles(
     sz = sy * U.shape[3]
     su = sz * U.shape[2]
     sp = px * py * pz
-    gy = 2 if DIMENSIONS > 1 else 0
-    gz = 2 if DIMENSIONS > 2 else 0
-    slopes, fluxes = VARIABLES * px, (FLUXES + 1) * px
+    gy = GHOSTS if DIMENSIONS > 1 else 0
+    gz = GHOSTS if DIMENSIONS > 2 else 0
+    rises, fluxes = (2 if CURVED else 1) * VARIABLES * px, (FLUXES + 1) * px
     faces = real(2 * DIMENSIONS)
     rx, ry, rz = faces * cx, faces * cy, faces * cz
     P = workspace(VARIABLES * sp)
-    T = workspace((3 + 2 * py) * slopes)
+    T = workspace((3 + 2 * py) * rises)
     F = workspace((3 + 2 * py) * fluxes)
     for at in range(begin, end):
         t = chosen[at]
@@ -295,7 +311,7 @@ def advance_tiles(
         u0 = tiles[t, BLOCK] * VARIABLES * su + tiles[t, Z0] * sz + tiles[t, Y0] * sy + tiles[t, X0]
         v0 = u0 - tiles[t, BLOCK] * (VARIABLES - volumes.shape[1]) * su
         uniform = calm[t] or (
-            is_uniform(U, u0 - gz * sz - gy * sy - 2, su, sz, sy, nx + 4, ny + 2 * gy, nz + 2 * gz)
+            is_uniform(U, u0 - gz * sz - gy * sy - GHOSTS, su, sz, sy, nx + 2 * GHOSTS, ny + 2 * gy, nz + 2 * gz)
             and is_uniform(U_n, u0, su, sz, sy, nx, ny, nz)
         )
         n, m, l, step = (1, 1, 1, 0) if uniform else (nx, ny, nz, 1)
@@ -304,40 +320,42 @@ def advance_tiles(
             for j in range(-gy, m + gy):
                 beside = LOOKS_SIDEWAYS and j >= -1 and j <= m and k >= -1 and k <= l
                 if (j >= 0 and j < m) or (k >= 0 and k < l) or beside:
-                    primitives_row(U, P, u0 + k * sz + j * sy - 2, su, ((k + gz) * py + j + gy) * px, sp, n + 4)
+                    primitives_row(
+                        U, P, u0 + k * sz + j * sy - GHOSTS, su, ((k + gz) * py + j + gy) * px, sp, n + 2 * GHOSTS
+                    )
         count = 0
         tx, fx = 0, 0
-        ty, ty_next = slopes, 2 * slopes
+        ty, ty_next = rises, 2 * rises
         fy, fy_next = fluxes, 2 * fluxes
         if DIMENSIONS > 2:
             for j in range(m):
-                c = (gz * py + j + gy) * px + 2
-                tz, tz_next, fz = (3 + j) * slopes, (3 + py + j) * slopes, (3 + j) * fluxes
-                slopes_row(P, T, c - px * py, sp, px * py, tz_next, px, n)
-                slopes_row(P, T, c, sp, px * py, tz, px, n)
+                c = (gz * py + j + gy) * px + GHOSTS
+                tz, tz_next, fz = (3 + j) * rises, (3 + py + j) * rises, (3 + j) * fluxes
+                rises_row(P, T, c - px * py, sp, px * py, tz_next, px, n)
+                rises_row(P, T, c, sp, px * py, tz, px, n)
                 count += face_fluxes(P, T, F, c - px * py, sp, px * py, 1, px, tz_next, tz, px, fz, 2, rz, n, n)
                 if sides & 16:
                     book(through, t, 4, F, fz, step, px, 2, nx, z_alike, weight * cz)
         for k in range(l):
             now, then = (3 + py * (k % 2)), (3 + py * ((k + 1) % 2))
             if DIMENSIONS > 1:
-                c = ((k + gz) * py + gy) * px + 2
-                slopes_row(P, T, c - px, sp, px, ty_next, px, n)
-                slopes_row(P, T, c, sp, px, ty, px, n)
+                c = ((k + gz) * py + gy) * px + GHOSTS
+                rises_row(P, T, c - px, sp, px, ty_next, px, n)
+                rises_row(P, T, c, sp, px, ty, px, n)
                 count += face_fluxes(P, T, F, c - px, sp, px, 1, px * py, ty_next, ty, px, fy, 1, ry, n, n)
                 if sides & 4:
                     book(through, t, 2, F, fy, step, px, 1, nx, y_alike, weight * cy)
             for j in range(m):
-                c = ((k + gz) * py + j + gy) * px + 2
-                slopes_row(P, T, c - 1, sp, 1, tx, px, n + 2)
+                c = ((k + gz) * py + j + gy) * px + GHOSTS
+                rises_row(P, T, c - 1, sp, 1, tx, px, n + 2)
                 count += face_fluxes(P, T, F, c - 1, sp, 1, px, px * py, tx, tx + 1, px, fx, 0, rx, n + 1, n)
                 if DIMENSIONS > 1:
-                    slopes_row(P, T, c + px, sp, px, ty_next, px, n)
+                    rises_row(P, T, c + px, sp, px, ty_next, px, n)
                     own = n if j < m - 1 else 0
                     count += face_fluxes(P, T, F, c, sp, px, 1, px * py, ty, ty_next, px, fy_next, 1, ry, n, own)
                 if DIMENSIONS > 2:
-                    tz, tz_next, fz = (now + j) * slopes, (then + j) * slopes, (then + j) * fluxes
-                    slopes_row(P, T, c + px * py, sp, px * py, tz_next, px, n)
+                    tz, tz_next, fz = (now + j) * rises, (then + j) * rises, (then + j) * fluxes
+                    rises_row(P, T, c + px * py, sp, px * py, tz_next, px, n)
                     own = n if k < l - 1 else 0
                     count += face_fluxes(P, T, F, c, sp, px * py, 1, px, tz, tz_next, px, fz, 2, rz, n, own)
                 u = u0 + k * sz + j * sy

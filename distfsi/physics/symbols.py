@@ -38,6 +38,9 @@ OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
 CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
+GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
+SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
+CURVED = Symbol("whether primitives rise by different amounts on the two sides of a cell's mean")
 LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
@@ -47,6 +50,10 @@ stored_reference_1 = chosen(
 )
 stored_reference_2 = chosen("stored_reference_2", "as reference_2, to the energy that is stored")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
+reconstructed = chosen(
+    "reconstructed", "cells around and with one -> rise from its low face to its mean, on to its high face"
+)
+sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
 primitives = chosen("primitives", "conserved state -> primitive state")
 conserved = chosen("conserved", "primitive state -> conserved state")
 face_flux = chosen("face_flux", "left and right primitive states, normal velocity first; pressure jump -> fluxes")

@@ -93,7 +93,9 @@ def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
 
 
 def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
-    """Regions and the states in them."""
+    """Regions and the states in them; a method that has its phases."""
+    if fluid.sharpening and len(fluid.phases) < 2:
+        yield Fault(("fluid", "sharpening"), "needs an interface, so two phases")
     if not fluid.regions:
         yield Fault(("fluid", "regions"), "is empty; expected an initial state")
     for n, (source, region) in enumerate(zip(given.regions, fluid.regions, strict=True)):

@@ -11,6 +11,7 @@ from typing import Literal
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
+Reconstruction = Literal["first_order", "minmod", "van_leer"]
 TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
@@ -133,12 +134,13 @@ class Fluid:
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
-    reconstruction: Literal["first_order", "minmod", "van_leer"]
+    reconstruction: Reconstruction
     minimum_volume_fraction: float
     inflow: tuple[tuple[FluidState | None, FluidState | None], ...]  # per axis, per side
     precision: Literal["float64", "float32"]
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
+    sharpening: bool = False
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
