@@ -17,7 +17,12 @@ from distfsi.physics import euler, five_equation, limiters, positivity, reconstr
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
-LIMITERS = {"first_order": limiters.first_order, "minmod": limiters.minmod, "van_leer": limiters.van_leer}
+RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
+    "first_order": (reconstruction.muscl, limiters.first_order, 2),
+    "minmod": (reconstruction.muscl, limiters.minmod, 2),
+    "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
+    "weno5": (reconstruction.weno5, limiters.van_leer, 3),
+}
 RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
     "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
     "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
@@ -109,6 +114,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
+    reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
+    curved = reconstructed is reconstruction.weno5
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
@@ -117,9 +124,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
-        "GHOSTS": 2,
-        "SHARPENED": fluid.sharpening,
-        "CURVED": False,
+        "GHOSTS": ghosts,
+        "SHARPENED": phases == 2 and (fluid.sharpening or curved),
+        "CURVED": curved,
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme == "cut_cells",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
@@ -127,9 +134,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     bindings = {name: Bound(getattr(model, name)) for name in names}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
     bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
-    bindings["limited_slope"] = Bound(LIMITERS[fluid.reconstruction])
-    bindings["reconstructed"] = Bound(reconstruction.muscl)
-    bindings["sharpened"] = Bound(reconstruction.overbee)
+    bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
+    bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
@@ -137,6 +143,11 @@ def fluid_model(scene: Scene) -> FluidModel:
     bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
     bindings |= {f"stored_reference_{k}": reference for k, reference in enumerate(_stored_references(fluid, eos), 1)}
     return FluidModel(constants, bindings, eos, dimensions)
+
+
+def ghost_layers(scene: Scene) -> int:
+    """Layers of ghost cells on each side of a block that the scene's method asks for."""
+    return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
 
 
 def _stored_references(fluid: Fluid, eos: tuple[FluidEos, ...]) -> list[Bound]:

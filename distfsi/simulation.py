@@ -22,7 +22,7 @@ from distfsi.errors import Diverged, InputError, StepFailed, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
-from distfsi.model import fluid_model
+from distfsi.model import fluid_model, ghost_layers
 from distfsi.output.journal import Journal, set_aside
 from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
@@ -257,7 +257,7 @@ class Simulation:
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
     """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
-    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries)
+    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene))
     blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
     if scene.solid is None or costs is not None:
         return blocks

@@ -86,13 +86,13 @@ def check_ghost_cells(communicator, copy, grid, block_cells, dtype=np.float64):
 
 def random_grid(rng):
     """A small grid with any boundaries, and a block size that often leaves edge blocks of one cell."""
-    dimensions = int(rng.integers(1, 4))
-    cells = tuple(rng.integers(2, (40, 14, 8)[dimensions - 1], dimensions).tolist())
+    dimensions, layers = int(rng.integers(1, 4)), int(rng.integers(2, 4))
+    cells = tuple(rng.integers(layers, (40, 14, 8)[dimensions - 1], dimensions).tolist())
     boundaries = tuple(
         ("periodic", "periodic") if rng.random() < 0.25 else tuple(rng.choice(KINDS, 2).tolist()) for _ in cells
     )
     block_cells = tuple(int(rng.choice([1, 2, 3, max(n - 1, 1), n])) for n in cells)
-    return Grid.of((0.0,) * dimensions, (1.0,) * dimensions, cells, boundaries), block_cells
+    return Grid.of((0.0,) * dimensions, (1.0,) * dimensions, cells, boundaries, layers), block_cells
 
 
 def check_ghosts(communicator):

@@ -80,6 +80,8 @@ BROKEN = [
     (SOD + "[solid.bodies.a]\n", ["shape", "spacing", "density", "eos", "strength"]),
     (changed(BUBBLE, ("[fluid.inflow.x_high]", "[fluid.inflow.y_low]")), ["fluid.inflow.x_high", "fluid.inflow.y_low"]),
     (changed(BUBBLE, ("velocity", "velocity = [1]")), ["has 1 entries, needs 2"]),
+    (changed(TUBE, ("[fluid.phases.products]", "[fluid]\nreconstruction = 'weno5'\n[fluid.phases.products]")),
+     ["'weno5' looks past the cells beside a solid"]),
     (changed(TUBE, ("rho0", "")), ["fluid.phases.products.rho0"]),
     (changed(TUBE, ("R1", 'R1 = "4 m"')), ["has units m, needs a pure number"]),
     (changed(TUBE, ("energy", 'energy = "1 MJ/kg"')), ["has a sound speed only above"]),

@@ -44,7 +44,7 @@ CASES = {
     "1D gas": (("air",), 1, {}),
     "1D gas, float32": (("air",), 1, {"precision": "float32"}),
     "1D explosive and gas": (("tnt", "air"), 1, {"reconstruction": "van_leer", "riemann": "hll"}),
-    "2D gas": (("air",), 2, {"riemann": "adaptive"}),
+    "2D gas": (("air",), 2, {"riemann": "adaptive", "reconstruction": "weno5"}),
     "2D gas, float32, first order": (("air",), 2, {"precision": "float32", "reconstruction": "first_order"}),
     "2D water and gas": (("water", "air"), 2, {"riemann": "adaptive", "sharpening": True}),
     "3D gas": (("air",), 3, {}),
@@ -53,7 +53,7 @@ LONG = {
     "2D explosive and water, float32": (("tnt", "water"), 2, {"precision": "float32"}),
     "3D gas, sideways": (("air",), 3, {"riemann": "adaptive", "reconstruction": "van_leer"}),
     "3D explosive and gas": (("tnt", "air"), 3, {"riemann": "adaptive"}),
-    "3D water and gas, float32": (("water", "air"), 3, {"precision": "float32"}),
+    "3D water and gas, float32": (("water", "air"), 3, {"precision": "float32", "reconstruction": "weno5"}),
 }
 
 

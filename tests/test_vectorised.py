@@ -27,7 +27,7 @@ SCENES = {
 }
 METHOD = {
     "water-air-2D": {"riemann": "hllc", "sharpening": True},
-    "products-air-3D": {"riemann": "adaptive"},
+    "products-air-3D": {"riemann": "adaptive", "limiter": "weno5"},
     "air-3D": {"riemann": "adaptive"},
     "products-air-2D-single": {"riemann": "hll"},
 }
@@ -36,7 +36,7 @@ WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
 def module_text(row, scene):
     names, dimensions, real = SCENES[scene]
-    model = model_of(*names, dimensions=dimensions, limiter="van_leer", **METHOD[scene])
+    model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
     return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
 
 

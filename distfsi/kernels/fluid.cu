@@ -1,6 +1,6 @@
 // The loops of kernels/fluid.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
 // ---- tuples and arrays ------------------------------------------------------------------------------------------------
@@ -106,8 +106,9 @@ template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real ra
     for (int v = 0; v < FLUXES; v++) value[v] = F[v * step];
     const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
     const auto f = tuple_of<FLUXES>(value);
-    if (!(reserve(l, r, f, minimum(sound_speed(L), sound_speed(R)), rate) < 0) || is_admissible(l, r, f, rate))
-        return false;
+    real c = minimum(sound_speed(L), sound_speed(R));
+    if constexpr (CURVED) c = minimum(c, minimum(sound_speed(l), sound_speed(r)));
+    if (!(reserve(l, r, f, c, rate) < 0) || is_admissible(l, r, f, rate)) return false;
     put(limited_flux(l, r, f, jump, rate), F, step);
     return true;
 }

@@ -132,6 +132,8 @@ def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, r
         for v in static_range(FLUXES):
             store(F, f + v * st + i, flux[v])
         c = min(sound_speed(left), sound_speed(right))
+        if CURVED:  # then a cell's mean may have a much lower one
+            c = min(c, min(sound_speed(low), sound_speed(high)))
         left_over = reserve(low, high, flux, c, rate)
         store(F, f + FLUXES * st + i, left_over)
         count += 1 if left_over < 0.0 else 0

@@ -13,7 +13,7 @@ import numpy as np
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.curve import deal, morton_keys
 
-GHOSTS = 2  # layers of ghost cells on each side of every used axis
+GHOSTS = 2  # layers of ghost cells on each side of every used axis, where nothing asks for more
 
 # What a part of a run must keep to go on, by kind and name, in a form that any number of ranks can take up:
 #   cells      (local blocks, ..., bz, by, bx): whole blocks without ghosts
@@ -35,9 +35,10 @@ class Grid:
     lower: tuple[float, float, float]
     spacing: tuple[float, float, float]
     boundaries: tuple[tuple[str, str], ...]
+    ghost_layers: int = GHOSTS
 
     @classmethod
-    def of(cls, lower: tuple, upper: tuple, cells: tuple, boundaries: tuple) -> Grid:
+    def of(cls, lower: tuple, upper: tuple, cells: tuple, boundaries: tuple, ghost_layers: int = GHOSTS) -> Grid:
         """The grid with the given values for each of its 1 to 3 dimensions."""
         unused = 3 - len(cells)
         return cls(
@@ -46,12 +47,13 @@ class Grid:
             lower=(*lower, *[0.0] * unused),
             spacing=(*((b - a) / n for a, b, n in zip(lower, upper, cells, strict=True)), *[1.0] * unused),
             boundaries=(*(tuple(pair) for pair in boundaries), *[("none", "none")] * unused),
+            ghost_layers=ghost_layers,
         )
 
     @property
     def ghosts(self) -> tuple[int, int, int]:
         """Ghost layers on each side of x, y, z."""
-        return tuple(GHOSTS if axis < self.dimensions else 0 for axis in range(3))
+        return tuple(self.ghost_layers if axis < self.dimensions else 0 for axis in range(3))
 
     @property
     def upper(self) -> tuple[float, float, float]:

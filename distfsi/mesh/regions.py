@@ -8,6 +8,7 @@ three runs is a region: a box of cells copied from one block. Tables of regions 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -55,11 +56,22 @@ def axis_runs(cells: int, block_cells: int, ghosts: int, kinds: tuple[str, str])
             start = first - begin + ghosts
             sources = [source_cell(index, cells, kinds) for index in range(first, first + ghosts)]
             for (source, flip, inflow), group in groupby(sources, lambda s: (s[0] // block_cells, *s[1:])):
-                places = [cell % block_cells + ghosts for cell, *_ in group]
-                step = places[-1] - places[0]  # two ghost cells: at most one step
-                runs.append((block, start, len(places), source, places[0], step, flip, inflow, 1))
-                start += len(places)
+                for places in even_steps([cell % block_cells + ghosts for cell, *_ in group]):
+                    step = places[1] - places[0] if len(places) > 1 else 0
+                    runs.append((block, start, len(places), source, places[0], step, flip, inflow, 1))
+                    start += len(places)
     return np.array(runs, dtype=RUN)
+
+
+def even_steps(places: list[int]) -> Iterator[list[int]]:
+    """Cut a list where its steps change."""
+    first = 0
+    for n in range(2, len(places) + 1):
+        if n == len(places) or (n - first >= 2 and places[n] - places[n - 1] != places[first + 1] - places[first]):
+            yield places[first:n]
+            first = n
+    if first < len(places):
+        yield places[first:]
 
 
 def products(runs: list[np.ndarray], coordinates: np.ndarray, end: str) -> np.ndarray:

@@ -73,7 +73,7 @@ def check(
     if solid is not None:
         yield from check_solid(solid, domain)
         if fluid is not None:
-            yield from check_coupling(solid, domain)
+            yield from check_coupling(solid, domain, fluid)
 
 
 def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
@@ -227,8 +227,10 @@ def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) ->
     return gap.min() < CLOSEST_BODIES * 0.5 * (a.spacing + b.spacing)
 
 
-def check_coupling(solid: Solid, domain: Domain) -> Iterator[Fault]:
-    """Bodies in a fluid are tight."""
+def check_coupling(solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
+    """Bodies in a fluid are tight, and faces look no farther than to the next cells."""
+    if fluid.reconstruction == "weno5":
+        yield Fault(("fluid", "reconstruction"), "'weno5' looks past the cells beside a solid; expected another")
     coarsest = COARSEST_SPACING * min(domain.spacing)
     for body in solid.bodies:
         if body.spacing > coarsest:

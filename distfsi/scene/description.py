@@ -11,7 +11,7 @@ from typing import Literal
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
-Reconstruction = Literal["first_order", "minmod", "van_leer"]
+Reconstruction = Literal["first_order", "minmod", "van_leer", "weno5"]
 TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]

@@ -101,7 +101,9 @@ class FluidInput(Table):
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
-    reconstruction: description.Reconstruction = Field("minmod", description="slopes of MUSCL")
+    reconstruction: description.Reconstruction = Field(
+        "minmod", description="slopes of MUSCL, or curves through five cells; volume fractions then by van_leer"
+    )
     sharpening: bool = Field(False, description="of two phases: keep their interfaces within some three cells")
     riemann: description.RiemannSolver = Field(
         "hllc", description='flux; "adaptive": "hllc" with shear along strong shocks, against carbuncles'
