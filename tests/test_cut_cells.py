@@ -31,7 +31,7 @@ def rigid(shape, spacing, velocity):
 
 def volumes(case):
     """(z, y, x) of the whole grid."""
-    return case.grid_of(case.coupling.swept)[0]
+    return case.grid_of(case.coupling.swept.here())[0]
 
 
 def primitives(case):
@@ -205,7 +205,7 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
 
 def low_side(case):
     """Mass on the low side of a plate and in what is shut in, and whether gas gets across."""
-    volume, aperture = volumes(case), case.grid_of(case.coupling.wall.apertures[1])
+    volume, aperture = volumes(case), case.grid_of(case.coupling.wall.apertures[1].here())
     index, edges = np.arange(volume.size).reshape(volume.shape), []
     for axis in range(case.fluid.model.dimensions):
         low, high = (np.delete(index, end, axis=2 - axis).ravel() for end in (-1, 0))

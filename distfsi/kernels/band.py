@@ -5,8 +5,8 @@ An item is a row of cells along x. Rows are numbered as they lie in memory, ghos
 kernels/coupling.py.
 """
 
-from distfsi.device.markers import driver, helper, load, row, store
-from distfsi.kernels.coupling import COVERED, FLUID
+from distfsi.device.markers import driver, load, row, store
+from distfsi.kernels.coupling import COVERED, FLUID, cells_of_row
 from distfsi.kernels.cut_geometry import step_to
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
@@ -39,15 +39,6 @@ def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept,
         if near[b] > 0:
             at = r * shape[2]
             whole_row(whole, kind, fraction_old, fraction_new, swept, at, at + b * (fields - 1) * cells, shape[2])
-
-
-@helper
-def cells_of_row(r, b, shape, extent):
-    """How many active cells a row has."""
-    gy = 2 if DIMENSIONS > 1 else 0
-    gz = 2 if DIMENSIONS > 2 else 0
-    j, k = r % shape[1] - gy, r // shape[1] % shape[0] - gz
-    return extent[b, 0] if j >= 0 and j < extent[b, 1] and k >= 0 and k < extent[b, 2] else 0
 
 
 @driver
@@ -98,3 +89,11 @@ def list_band(begin, end, near, plain, kind, swept, fields, shape, extent, first
             elif load(swept, share + i) != 1.0:
                 loose[l] = at + i
                 l += 1
+
+
+@driver
+def mark_band(begin, end, cells, near, plain, shape, mark):
+    """mark[n] = 1 where cells[n] is in the band or covered, else 0."""
+    for n in range(begin, end):
+        b = cells[n] // (shape[0] * shape[1] * shape[2])
+        mark[n] = 1 if near[b] > 0 and plain[cells[n]] == 0 else 0

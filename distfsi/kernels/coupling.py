@@ -33,6 +33,21 @@ def cell_at(block, i, j, k, shape):
 
 
 @helper
+def row_place(r, shape):
+    """Places along y and z, in its block, of a row of cells along x; rows are numbered as they lie in memory."""
+    gy = 2 if DIMENSIONS > 1 else 0
+    gz = 2 if DIMENSIONS > 2 else 0
+    return (r % shape[1] - gy, r // shape[1] % shape[0] - gz)
+
+
+@helper
+def cells_of_row(r, b, shape, extent):
+    """How many active cells a row has."""
+    j, k = row_place(r, shape)
+    return extent[b, 0] if j >= 0 and j < extent[b, 1] and k >= 0 and k < extent[b, 2] else 0
+
+
+@helper
 def center_of(at, shape, lower, spacing, origin):
     """Center [m] of the cell `at`."""
     block = at // (shape[0] * shape[1] * shape[2])

@@ -55,6 +55,14 @@ def take_contents(begin, end, band, U, swept, shape):
         put_content(U, swept, at, cells, with_energies(state_at(U, at, cells), load(swept, share_at(at, cells))))
 
 
+@driver
+def keep_volumes(begin, end, band, swept, shape, volume):
+    """volume[n] = that of the fluid in a cell of the band."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        volume[n] = load(swept, share_at(band[n], cells))
+
+
 @helper
 def index_of(at, shape, origin):
     """Place of a cell in the grid."""

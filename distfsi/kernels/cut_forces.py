@@ -4,7 +4,10 @@ Cells give to particles with the weights by which they see them (kernels/couplin
 momentum and work arrive as they leave.
 """
 
+from math import sqrt
+
 from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import center_of
 from distfsi.kernels.cut_cells import index_of, share_at, way_to_master
 from distfsi.kernels.cut_geometry import is_in_domain, step_to
@@ -12,6 +15,70 @@ from distfsi.kernels.gather import sum_particles
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
 from distfsi.physics.tensors import dot
+
+
+@helper
+def part_inside(position, i, volume, lower, upper):
+    """Part of the cube of a `volume` around a particle that is in the domain."""
+    side = side_of_cube(max(volume, 1e-300))
+    part = 1.0
+    for d in static_range(DIMENSIONS):
+        depth = min(position[i, d] - lower[d], upper[d] - position[i, d])
+        part = part * min(max(0.5 + depth / side, 0.0), 1.0)
+    return part
+
+
+@driver
+def keep_mass(begin, end, start, mass, density, lower, upper, kept):
+    """kept[i] = mass of a particle, 0 if it was outside the domain at the `start`."""
+    for i in range(begin, end):
+        inside = part_inside(start, i, mass[i] / density[i], lower, upper) > 0.0
+        kept[i] = mass[i] if inside else 0.0
+
+
+@driver
+def find_volumes(begin, end, mass, density, volume):
+    """volume[i] (n, 1) of a particle."""
+    for i in range(begin, end):
+        volume[i, 0] = mass[i] / density[i]
+
+
+@driver
+def keep_inside(begin, end, position, lower, upper, volume):
+    """volume[i] (n, 1) becomes what of it is in the domain."""
+    for i in range(begin, end):
+        volume[i, 0] = volume[i, 0] * part_inside(position, i, volume[i, 0], lower, upper)
+
+
+@driver
+def mark_stretched(begin, end, cell, farthest, volume, bond_count, deformation, mark):
+    """mark[i] = 1 where a particle that bonds hold may be longer than `farthest`, in units of half a `cell` or of its
+    reference size, if that is more; else 0."""
+    for i in range(begin, end):
+        side, squares = side_of_cube(volume[i]), 0.0
+        for k in range(DIMENSIONS * DIMENSIONS):
+            squares += deformation[i, k] * deformation[i, k]
+        stretched = side * sqrt(squares) > farthest * max(0.5 * cell, side)
+        mark[i] = 1 if stretched and bond_count[i] > 0 else 0
+
+
+@driver
+def find_momentum(begin, end, mass, velocity, momentum):
+    """momentum[i] = mass and mass times velocity."""
+    for i in range(begin, end):
+        momentum[i, 0] = mass[i]
+        for d in static_range(DIMENSIONS):
+            momentum[i, 1 + d] = mass[i] * velocity[i, d]
+
+
+@driver
+def clear(begin, end, band, fields, values, shape):
+    """values (blocks, fields, Z, Y, X) = 0 in the band."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        first = band[n] + band[n] // cells * (fields - 1) * cells
+        for k in range(fields):
+            store(values, first + k * cells, 0.0)
 
 
 @helper
@@ -45,13 +112,14 @@ def see_particles(
 
 
 @driver
-def spread_impulse(begin, end, band, impulse, inertia, kick, shape):
-    """kick (blocks, D, Z, Y, X) = velocity that a particle gains from a cell per kernel value [m^(d+1)/s]."""
+def spread_impulse(begin, end, band, volume, impulse, inertia, kick, shape):
+    """kick (blocks, D, Z, Y, X) = velocity that a particle gains from a cell of a `volume` per kernel value
+    [m^(d+1)/s]."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
         at = band[n] + band[n] // cells * (DIMENSIONS - 1) * cells
         for d in static_range(DIMENSIONS):
-            store(kick, at + d * cells, impulse[n, d] / inertia[n] if inertia[n] > 0.0 else 0.0)
+            store(kick, at + d * cells, impulse[n, d] * volume / inertia[n] if inertia[n] > 0.0 else 0.0)
 
 
 @driver

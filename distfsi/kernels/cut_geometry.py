@@ -12,7 +12,7 @@ are seen in the mirror of its sides.
 from math import sqrt
 
 from distfsi.device.markers import driver, helper, load, workspace
-from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at
+from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
 from distfsi.kernels.gather import any_particle, bins_around, sum_particles
 from distfsi.physics.apertures import open_cell, open_face
 from distfsi.physics.immersed import immersed_weight
@@ -117,75 +117,89 @@ def mirrored(index, cells):
 
 
 @driver
+def find_near(begin, end, near, search, start, lower, size, low, window, strides, spacing, origin, extent):
+    """near (blocks,) = NEAR where there are particles nearby, or cells that were not whole, else 0."""
+    for b in range(begin, end):
+        middle = tuple(lower[d] + (origin[b, d] + 0.5 * extent[b, d]) * spacing[d] for d in static_range(DIMENSIONS))
+        reach = tuple((0.5 * extent[b, d] + 2.0) * spacing[d] + search for d in static_range(DIMENSIONS))
+        if near[b] > 0 or any_particle(middle, reach, start, lower, size, low, window, strides):
+            near[b] = NEAR
+
+
+@driver
 def find_distances(
     begin, end, near, distance, radius, search, volume, ball, profile, position, start, order, lower, size, low, window,
     strides, shape, spacing, origin, extent, cells,
 ):  # fmt: skip
-    """distance = that of the corners of all cells of blocks that have particles nearby; near (blocks,) = which these
-    are, after it said which had cells that were not whole."""
-    for b in range(begin, end):
-        middle = tuple(lower[d] + (origin[b, d] + 0.5 * extent[b, d]) * spacing[d] for d in static_range(DIMENSIONS))
-        reach = tuple((0.5 * extent[b, d] + 2.0) * spacing[d] + search for d in static_range(DIMENSIONS))
-        if near[b] == 0 and not any_particle(middle, reach, start, lower, size, low, window, strides):
+    """distance = that of the corners of all cells of `near` blocks. An item is a row of corners along x."""
+    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
+    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
+    for r in range(begin, end):
+        b = r // ((shape[0] + uz) * (shape[1] + uy))
+        j, k = r % (shape[1] + uy) - gy, r // (shape[1] + uy) % (shape[0] + uz) - gz
+        if near[b] == 0 or j >= extent[b, 1] + gy + uy or k >= extent[b, 2] + gz + uz:
             continue
-        near[b] = NEAR
-        y_first, y_end = (-2, extent[b, 1] + 3) if DIMENSIONS > 1 else (0, 1)
-        z_first, z_end = (-2, extent[b, 2] + 3) if DIMENSIONS > 2 else (0, 1)
-        for k in range(z_first, z_end):
-            for j in range(y_first, y_end):
-                for i in range(-2, extent[b, 0] + 3):
-                    place = (
-                        mirrored(origin[b, 0] + i, cells[0]),
-                        mirrored(origin[b, 1] + j, cells[1]),
-                        mirrored(origin[b, 2] + k, cells[2]),
-                    )
-                    x = tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
-                    value = distance_at(
-                        x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window,
-                        strides,
-                    )  # fmt: skip
-                    least = 1e-7 * spacing[0]
-                    distance[corner_at(b, i, j, k, shape)] = least if abs(value) < least else value
+        for i in range(-2, extent[b, 0] + 3):
+            place = (
+                mirrored(origin[b, 0] + i, cells[0]),
+                mirrored(origin[b, 1] + j, cells[1]),
+                mirrored(origin[b, 2] + k, cells[2]),
+            )
+            x = tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
+            value = distance_at(
+                x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window, strides
+            )
+            least = 1e-7 * spacing[0]
+            distance[corner_at(b, i, j, k, shape)] = least if abs(value) < least else value
 
 
 @driver
-def open_up(begin, end, near, distance, before, fraction, aperture, shape, extent):
+def open_up(begin, end, near, distance, before, fraction, aperture, shape, extent, is_cut):
     """fraction of each cell, and aperture (blocks, D, Z, Y, X) of its low faces, that is open; in `near` blocks.
 
-    near becomes CUT where a cell is not open as a whole, now or `before`.
+    is_cut[r] = 1 where a cell of a row along x is not open as a whole, now or `before`, else 0.
     """
     cells = shape[0] * shape[1] * shape[2]
     uy, uz = (1 if DIMENSIONS > 1 else 0), (1 if DIMENSIONS > 2 else 0)
+    gy, gz = (2 if DIMENSIONS > 1 else 0), (2 if DIMENSIONS > 2 else 0)
     sy, sz = shape[2] + 1, (shape[2] + 1) * (shape[1] + uy)
-    for b in range(begin, end):
-        if near[b] == 0:
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        j, k = r % shape[1] - gy, r // shape[1] % shape[0] - gz
+        is_cut[r] = 0
+        if near[b] == 0 or j >= extent[b, 1] + gy or k >= extent[b, 2] + gz:
             continue
-        y_first, y_end = (-2, extent[b, 1] + 2) if DIMENSIONS > 1 else (0, 1)
-        z_first, z_end = (-2, extent[b, 2] + 2) if DIMENSIONS > 2 else (0, 1)
-        for k in range(z_first, z_end):
-            for j in range(y_first, y_end):
-                for i in range(-2, extent[b, 0] + 2):
-                    at, c = cell_at(b, i, j, k, shape), corner_at(b, i, j, k, shape)
-                    d = (
-                        distance[c],
-                        distance[c + 1],
-                        distance[c + uy * sy],
-                        distance[c + uy * sy + 1],
-                        distance[c + uz * sz],
-                        distance[c + uz * sz + 1],
-                        distance[c + uz * sz + uy * sy],
-                        distance[c + uz * sz + uy * sy + 1],
-                    )
-                    part = open_cell(d)
-                    fraction[at] = part if part > 1e-9 else 0.0
-                    if min(part, before[at]) < 1.0:
-                        near[b] = CUT
-                    face = at + b * (DIMENSIONS - 1) * cells
-                    aperture[face] = open_face((d[0], d[2], d[4], d[6]))
-                    if DIMENSIONS > 1:
-                        aperture[face + cells] = open_face((d[0], d[1], d[4], d[5]))
-                    if DIMENSIONS > 2:
-                        aperture[face + 2 * cells] = open_face((d[0], d[1], d[2], d[3]))
+        for i in range(-2, extent[b, 0] + 2):
+            at, c = cell_at(b, i, j, k, shape), corner_at(b, i, j, k, shape)
+            d = (
+                distance[c],
+                distance[c + 1],
+                distance[c + uy * sy],
+                distance[c + uy * sy + 1],
+                distance[c + uz * sz],
+                distance[c + uz * sz + 1],
+                distance[c + uz * sz + uy * sy],
+                distance[c + uz * sz + uy * sy + 1],
+            )
+            part = open_cell(d)
+            fraction[at] = part if part > 1e-9 else 0.0
+            if min(part, before[at]) < 1.0:
+                is_cut[r] = 1
+            face = at + b * (DIMENSIONS - 1) * cells
+            aperture[face] = open_face((d[0], d[2], d[4], d[6]))
+            if DIMENSIONS > 1:
+                aperture[face + cells] = open_face((d[0], d[1], d[4], d[5]))
+            if DIMENSIONS > 2:
+                aperture[face + 2 * cells] = open_face((d[0], d[1], d[2], d[3]))
+
+
+@driver
+def mark_cut_blocks(begin, end, near, is_cut, rows):
+    """near (blocks,) = CUT where one of a block's `rows` is."""
+    for b in range(begin, end):
+        for r in range(b * rows, (b + 1) * rows):
+            if is_cut[r] > 0:
+                near[b] = CUT
 
 
 # ---- who joins whom -------------------------------------------------------------------------------------------------
@@ -257,50 +271,46 @@ def find_masters(
     offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
     """
     cells = shape[0] * shape[1] * shape[2]
-    for b in range(begin, end):
-        if near[b] == 0:
-            continue
-        for k in range(extent[b, 2]):
-            for j in range(extent[b, 1]):
-                for i in range(extent[b, 0]):
-                    at = cell_at(b, i, j, k, shape)
-                    share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
-                    for d in static_range(DIMENSIONS):
-                        master[first + d * cells] = 0
-                    kind[at] = FLUID
-                    if not is_needy(fraction_old, fraction_new, swept, at, share):
-                        continue
-                    index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
-                    grad = tuple(
-                        slope_of_fraction(fraction_old, fraction_new, at, steps[d]) for d in static_range(DIMENSIONS)
-                    )
-                    steepness = sqrt(dot(grad, grad)) + 1e-12
-                    best, chosen = 0.0, -1
-                    for m in range(len(offsets)):
-                        if not is_in_domain(index, offsets[m], grid_cells):
-                            continue
-                        step = step_to(offsets, m, steps)
-                        if is_needy(fraction_old, fraction_new, swept, at + step, share + step):
-                            continue
-                        away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
-                        length = sqrt(dot(away, away))
-                        cosine = dot(away, grad) / (length * steepness)
-                        score = load(fraction_new, at + step) * (2.0 + cosine) - 0.01 * length
-                        if score > best + 1e-12:
-                            is_open = False
-                            for s in range(len(sequences)):
-                                is_open = is_open or path_is_open(
-                                    aperture_old, aperture_new, at, offsets[m], sequences[s], steps, cells
-                                )
-                            if is_open:
-                                best, chosen = score, m
-                    if chosen >= 0:
-                        for d in static_range(DIMENSIONS):
-                            master[first + d * cells] = offsets[chosen, d]
-                    elif load(swept, share) <= 0.0:
-                        kind[at] = COVERED
-                    else:
-                        kind[at] = SHUT
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        j, k = row_place(r, shape)
+        for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
+            at = cell_at(b, i, j, k, shape)
+            share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
+            for d in static_range(DIMENSIONS):
+                master[first + d * cells] = 0
+            kind[at] = FLUID
+            if not is_needy(fraction_old, fraction_new, swept, at, share):
+                continue
+            index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
+            grad = tuple(slope_of_fraction(fraction_old, fraction_new, at, steps[d]) for d in static_range(DIMENSIONS))
+            steepness = sqrt(dot(grad, grad)) + 1e-12
+            best, chosen = 0.0, -1
+            for m in range(len(offsets)):
+                if not is_in_domain(index, offsets[m], grid_cells):
+                    continue
+                step = step_to(offsets, m, steps)
+                if is_needy(fraction_old, fraction_new, swept, at + step, share + step):
+                    continue
+                away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
+                length = sqrt(dot(away, away))
+                cosine = dot(away, grad) / (length * steepness)
+                score = load(fraction_new, at + step) * (2.0 + cosine) - 0.01 * length
+                if score > best + 1e-12:
+                    is_open = False
+                    for s in range(len(sequences)):
+                        is_open = is_open or path_is_open(
+                            aperture_old, aperture_new, at, offsets[m], sequences[s], steps, cells
+                        )
+                    if is_open:
+                        best, chosen = score, m
+            if chosen >= 0:
+                for d in static_range(DIMENSIONS):
+                    master[first + d * cells] = offsets[chosen, d]
+            elif load(swept, share) <= 0.0:
+                kind[at] = COVERED
+            else:
+                kind[at] = SHUT
 
 
 @driver
@@ -309,25 +319,40 @@ def find_refuges(
 ):  # fmt: skip
     """master of SHUT cells = the most open of the FLUID cells behind open faces, which takes their fluid; 0 if none."""
     cells = shape[0] * shape[1] * shape[2]
-    for b in range(begin, end):
-        if near[b] == 0:
-            continue
-        for k in range(extent[b, 2]):
-            for j in range(extent[b, 1]):
-                for i in range(extent[b, 0]):
-                    at = cell_at(b, i, j, k, shape)
-                    if kind[at] != SHUT:
-                        continue
-                    first = at + b * (DIMENSIONS - 1) * cells
-                    index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
-                    most = 0.0
-                    for axis in range(DIMENSIONS):
-                        for side in range(2):
-                            way = 2 * side - 1
-                            inside = index[axis] + way >= 0 and index[axis] + way < grid_cells[axis]
-                            part = load(fraction_new, at + way * steps[axis])
-                            if inside and kind[at + way * steps[axis]] == FLUID and part > most:
-                                if opening(aperture_old, aperture_new, at + side * steps[axis], axis, cells) > 0.0:
-                                    most = part
-                                    for d in range(DIMENSIONS):
-                                        master[first + d * cells] = way if d == axis else 0
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        j, k = row_place(r, shape)
+        for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
+            at = cell_at(b, i, j, k, shape)
+            if kind[at] != SHUT:
+                continue
+            first = at + b * (DIMENSIONS - 1) * cells
+            index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
+            most = 0.0
+            for axis in range(DIMENSIONS):
+                for side in range(2):
+                    way = 2 * side - 1
+                    inside = index[axis] + way >= 0 and index[axis] + way < grid_cells[axis]
+                    part = load(fraction_new, at + way * steps[axis])
+                    if inside and kind[at + way * steps[axis]] == FLUID and part > most:
+                        if opening(aperture_old, aperture_new, at + side * steps[axis], axis, cells) > 0.0:
+                            most = part
+                            for d in range(DIMENSIONS):
+                                master[first + d * cells] = way if d == axis else 0
+
+
+@driver
+def cover_evicted(begin, end, kind, master, shape):
+    """Cells that are shut and have a refuge are covered, and have none. An item is a row of cells, ghosts included."""
+    cells = shape[0] * shape[1] * shape[2]
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        for at in range(r * shape[2], (r + 1) * shape[2]):
+            if kind[at] == SHUT:
+                first, left = at + b * (DIMENSIONS - 1) * cells, 0
+                for d in range(DIMENSIONS):
+                    if master[first + d * cells] != 0:
+                        left = 1
+                        master[first + d * cells] = 0
+                if left == 1:
+                    kind[at] = COVERED

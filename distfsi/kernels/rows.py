@@ -48,13 +48,13 @@ def find_bounds(begin, end, chunk, values, width, bounds):
 
 
 @driver
-def add_rows(begin, end, first, values, sums):
-    """sums[c] = sum of the rows first[c] … first[c + 1] of the values (n, k), one after the other."""
+def add_rows(begin, end, first, width, values, sums):
+    """sums[c] = sum of the rows first[c] … first[c + 1] of the values, one after the other."""
     for c in range(begin, end):
-        for k in range(values.shape[1]):
+        for k in range(width):
             total = 0.0
             for i in range(first[c], first[c + 1]):
-                total += values[i, k]
+                total += values[i * width + k]
             sums[c, k] = total
 
 
@@ -110,3 +110,6 @@ def extend(begin, end, own, width, source, stride, column, packed, extended):
         for k in range(width):
             value = source[i * width + k] if i < own else packed[(i - own) * stride + column + k]
             extended[i * width + k] = value
+
+
+REDUCTIONS = (find_largest, find_least, find_bounds, add_rows)

@@ -81,21 +81,20 @@ class Rows:
 class Groups:
     """Sums over groups of rows, the same whatever else there is: in each group by runs of CHUNK rows."""
 
-    def __init__(self, device: Device, kernels: SimpleNamespace, group: np.ndarray, count: int):
-        """`group` (n,) ascending: the group of each row, of `count`."""
-        self._device, self._kernels, self._count = device, kernels, count
-        size = np.bincount(group, minlength=count)
-        runs = -(-size // CHUNK)
-        self._group = np.repeat(np.arange(count), runs)
+    def __init__(self, device: Device, kernels: SimpleNamespace, sizes: np.ndarray):
+        """`sizes` (groups,): how many rows each group has, one group after the other."""
+        self._device, self._kernels, self._count = device, kernels, len(sizes)
+        runs = -(-sizes // CHUNK)
+        self._group = np.repeat(np.arange(len(sizes)), runs)
         number = np.arange(len(self._group)) - np.repeat(np.cumsum(runs) - runs, runs)
-        first = (np.cumsum(size) - size)[self._group] + CHUNK * number
-        self._first = device.array(np.append(first, len(group)))
+        first = (np.cumsum(sizes) - sizes)[self._group] + CHUNK * number
+        self._first = device.array(np.append(first, sizes.sum()))
 
     def sums(self, values: Any) -> np.ndarray:
-        """Sums (count, k) of the rows of `values` (n, k)."""
-        runs, width = len(self._group), values.shape[1]
+        """Sums (groups, k) of the rows of `values` (n, k); k is 1 for values (n,)."""
+        runs, width = len(self._group), values.shape[1] if len(values.shape) > 1 else 1
         sums = self._device.empty((runs, width))
-        self._device.run(self._kernels.add_rows, runs, self._first, values, sums)
+        self._device.run(self._kernels.add_rows, runs, self._first, width, values.reshape(-1), sums)
         columns = self._device.get(sums).T
         return np.stack([np.bincount(self._group, column, self._count) for column in columns], axis=1)
 

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as kernels
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
@@ -47,7 +47,7 @@ class Coupling:
 
     causes = ("wall", "covered", "fresh", "sides")
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Team):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
@@ -67,9 +67,8 @@ class Coupling:
         self._find_neighbourhood()
         self._find_sides()
 
-        self.kind = blocks.allocate(1, np.uint8)
-        self.kind[:] = kernels.UNKNOWN
-        self._kinds = self.kind.reshape(-1)
+        self.kind = Pair(team, np.full((blocks.local_count, 1, *blocks.shape), kernels.UNKNOWN, np.uint8))
+        self._kinds = self.kind.there.reshape(-1)
         self._occupied = np.ones(blocks.local_count, dtype=np.uint8)
         self._kick = blocks.allocate(grid.dimensions)
         self._ledger = {cause: np.zeros((blocks.local_count, model.conserved)) for cause in self.causes[:-1]}
@@ -131,7 +130,7 @@ class Coupling:
             self._shape, self._spacing, blocks.origin, blocks.extent,
         )  # fmt: skip
         self._ledger["covered"] -= lost * self._cell_volume
-        self._exchange(self.kind, np.array([-1]), kernels.COVERED)
+        self._exchange(self.kind.there, np.array([-1]), kernels.COVERED)
         self._list_cells()
         n = len(self._covered)
         self._velocity, self._inertia = np.empty((n, D), self._rest.dtype), np.empty(n)
@@ -221,7 +220,7 @@ class Coupling:
     @property
     def covered(self) -> np.ndarray:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
-        return self.kind[:, 0] >= kernels.COVERED
+        return self.kind.here()[:, 0] >= kernels.COVERED
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""
@@ -239,13 +238,13 @@ class Coupling:
     def snapshot(self) -> Snapshot:
         """What a restart needs: which cells are covered, so that those are known that come free; and the books."""
         return {
-            "cells": {"kind": self.blocks.without_ghosts(self.kind)},
+            "cells": {"kind": self.blocks.without_ghosts(self.kind.here())},
             "sums": {**self._ledger, "sides": self._through_sides},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.blocks.without_ghosts(self.kind)[:] = snapshot["cells"]["kind"]
+        self.blocks.without_ghosts(self.kind.here())[:] = snapshot["cells"]["kind"]
         self._occupied[:] = 1
         for cause, amounts in {**self._ledger, "sides": self._through_sides}.items():
             amounts[:] = snapshot["sums"][cause]

@@ -115,6 +115,15 @@ class Fluid:
         return self._buffers[0].here()
 
     @property
+    def there(self) -> Any:
+        """The state at the present time on the device."""
+        return self._buffers[0].there
+
+    def changed(self) -> None:
+        """The state on the host has been changed."""
+        self._buffers[0].changed()
+
+    @property
     def previous(self) -> np.ndarray:
         """The state before the last step, until the next one begins."""
         return self._buffers[1].here()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from distfsi.device.seam import Pair
 from distfsi.kernels import peaks as kernels
 from distfsi.mesh.blocks import Snapshot
 from distfsi.parts.coupling import Coupling
@@ -34,7 +35,7 @@ class Peaks:
         self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
         self.fields = blocks.allocate(len(NAMES))
         self.fields[:, kernels.ARRIVAL] = np.inf
-        self._kind = coupling.kind if coupling else blocks.allocate(1, np.uint8)
+        self._kind = coupling.kind if coupling else Pair(fluid.team, blocks.allocate(1, np.uint8))
         self._shape = np.array(blocks.shape)
 
     def after_step(self, simulation) -> None:
@@ -42,8 +43,9 @@ class Peaks:
         blocks, fluid = self.fluid.blocks, self.fluid
         before = fluid.previous if simulation.steps else fluid.state
         fluid.team.run(
-            self.kernels.remember_peaks, blocks.local_count, fluid.state, before, self.fields, self._kind, self._shape,
-            blocks.extent, self.peaks.ambient_pressure, self.peaks.arrival_overpressure, simulation.time, simulation.dt,
+            self.kernels.remember_peaks, blocks.local_count, fluid.state, before, self.fields, self._kind.read,
+            self._shape, blocks.extent, self.peaks.ambient_pressure, self.peaks.arrival_overpressure, simulation.time,
+            simulation.dt,
         )  # fmt: skip
 
     def outputs(self, covered: np.ndarray | None) -> dict[str, np.ndarray]:

@@ -36,8 +36,7 @@ from distfsi.scene.shapes import contains
 DRIVERS = (
     *particle_kernels.EXCHANGE,
     *neighbours.DRIVERS,
-    row_kernels.find_least,
-    row_kernels.add_rows,
+    *row_kernels.REDUCTIONS,
     motion.collect_state,
     motion.kick,
     motion.push,
@@ -206,7 +205,8 @@ class Solid:
         self._home, bodies = home, self.given.shape[1]
         self._block = home.here() - self.blocks.first
         group = self._block * bodies + self.columns["body"]
-        self._groups = Groups(self.team, self.kernels, group, self.blocks.local_count * bodies)
+        sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
+        self._groups = Groups(self.team, self.kernels, sizes)
 
     def _deform(self, dt: float, gradient: Any) -> None:
         c = self.columns

@@ -5,13 +5,16 @@ from __future__ import annotations
 from itertools import permutations, product
 from math import prod, sqrt
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.seam import Device, Pair
 from distfsi.kernels import band
 from distfsi.kernels import cut_geometry as kernels
+from distfsi.kernels.rows import count_marked, find_largest, list_marked
 from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.rows import Rows
 from distfsi.parts import search
 from distfsi.parts.search import SearchCells
 
@@ -20,15 +23,22 @@ COARSEST = 3.0  # particle spacings that this radius spans at least
 PROFILE_POINTS = 1025
 DRIVERS = (
     *search.DRIVERS,
+    find_largest,
     kernels.fill_kernel,
     kernels.thicken,
+    kernels.find_near,
     kernels.find_distances,
     kernels.open_up,
+    kernels.mark_cut_blocks,
     kernels.find_masters,
     kernels.find_refuges,
+    kernels.cover_evicted,
     band.find_whole,
     band.find_band,
     band.list_band,
+    band.mark_band,
+    count_marked,
+    list_marked,
 )
 
 
@@ -47,11 +57,12 @@ def plane_profile(dimensions: int, points: int = PROFILE_POINTS) -> np.ndarray:
 
 
 class WallGeometry:
-    """Open parts of cells and faces, before and after a step.
+    """Open parts of cells and faces, before and after a step; arrays are the device's.
 
     fractions  (old, new) fields (local blocks, 1, Z, Y, X): the part of each cell that is open, ghosts included
     apertures  (old, new) fields (local blocks, D, Z, Y, X): the same of each cell's low face along every axis
     near       (local blocks,) which blocks had particles near them or cells that were not whole
+    shape, steps, offsets, origin, extent, spacing, cells: of blocks, of ways to neighbours, of the grid
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
     """
 
@@ -65,117 +76,137 @@ class WallGeometry:
         self.search = max(self.radius, self.ball + 1.05 * h)
         self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.5 * h), 2.5 * h)
         self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
-        self.fractions = tuple(np.ones((blocks.local_count, 1, *blocks.shape), real) for _ in range(2))
-        self.apertures = tuple(np.ones((blocks.local_count, D, *blocks.shape), real) for _ in range(2))
-        self.near = np.ones(blocks.local_count, dtype=np.uint8)
-        self._whole, self._plain = blocks.allocate(1, np.uint8), blocks.allocate(1, np.uint8)
-        corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
-        self._distance = np.full((blocks.local_count, *corners), self.radius)
-        self._profile = plane_profile(D)
-        self._lower, self._upper, self._spacing = (np.array(a) for a in (grid.lower, grid.upper, grid.spacing))
-        self._cells = search.CellSort(self.kernels, team, self._lower[:D], self._upper[:D])
-        self.shape, self.cells = np.array(blocks.shape), np.array(grid.cells)
-        self.steps = np.array([1, self.shape[2], self.shape[2] * self.shape[1]])
+        self._allocate(real)
+        self._rows = Rows(team, self.kernels)
+        self._cells = search.CellSort(self.kernels, team, grid.lower[:D], grid.upper[:D])
+        self._least_spacing = min(grid.spacing[:D])
+        steps = (1, blocks.shape[2], blocks.shape[2] * blocks.shape[1])
         around = sorted((o for o in product((-1, 0, 1), repeat=D) if any(o)), key=lambda o: (sum(map(abs, o)), o))
-        self.offsets = np.array(around)
-        self._sequences = np.array(list(permutations(range(D))))
+        self._profile, self.spacing = team.array(plane_profile(D)), team.array(np.array(grid.spacing))
+        self.shape, self.cells, self.steps, self.offsets, self._sequences = (
+            team.array(np.array(a)) for a in (blocks.shape, grid.cells, steps, around, list(permutations(range(D))))
+        )
+        self.origin, self.extent = team.array(blocks.origin), team.array(blocks.extent)
 
-    def sort(self, position: np.ndarray, key: np.ndarray) -> SearchCells:
+    def _allocate(self, real: type) -> None:
+        """The fields, of cells that are all open."""
+        blocks, team, D = self.blocks, self.team, self.blocks.grid.dimensions
+        count = blocks.local_count
+        self.fractions = tuple(Pair(team, np.ones((count, 1, *blocks.shape), real)) for _ in range(2))
+        self.apertures = tuple(Pair(team, np.ones((count, D, *blocks.shape), real)) for _ in range(2))
+        self.near = Pair(team, np.ones(count, dtype=np.uint8))
+        self._whole, self._plain = (team.array(blocks.allocate(1, np.uint8)).reshape(-1) for _ in range(2))
+        corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
+        self._distance = Pair(team, np.full((count, *corners), self.radius))
+        self._count = count * prod(blocks.shape[:2])  # of rows of cells along x
+        self._corner_rows = count * prod(corners[:2])
+
+    def sort(self, position: Any, key: Any) -> SearchCells:
         """Particles by the cells of the grid they are in."""
-        return self._cells.sort(position, key, float(self._spacing[: self.blocks.grid.dimensions].min()))[1]
+        return self._cells.sort(position, key, self._least_spacing)[1]
 
-    def fill(self, own: int, position: np.ndarray, volume: np.ndarray, bins: SearchCells) -> np.ndarray:
+    def fill(self, own: int, position: Any, volume: Any, bins: SearchCells) -> Any:
         """Share (own,) of the kernel around each of the first `own` particles that is filled."""
-        filled = np.empty(own)
+        filled = self.team.empty(own)
         self.team.run(self.kernels.fill_kernel, own, filled, self.radius, volume, position, *bins)
         return filled
 
-    def thicken(self, own, filled, position, volume, bins) -> np.ndarray:
+    def thicken(self, own: int, filled: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
         """Radius (own,) [m] of the balls as which particles of thin bodies count; `filled` of all particles."""
-        ball = np.empty(own)
+        ball = self.team.empty(own)
         self.team.run(
             self.kernels.thicken, own, ball, filled, self.radius, self.ball, volume, position, *bins
         )  # fmt: skip
         return ball
 
-    def cut(self, position: np.ndarray, volume: np.ndarray, ball: np.ndarray, bins: SearchCells) -> None:
+    def cut(self, position: Any, volume: Any, ball: Any, bins: SearchCells) -> None:
         """The new geometry becomes the old one, and that of these particles the new one."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
-        blocks, count = self.blocks, self.blocks.local_count
-        self.team.run(
-            self.kernels.find_distances, count, self.near, self._distance.reshape(-1), self.radius,
-            self.search if ball.any() else self.radius, volume, ball, self._profile, position, *bins,
-            self.shape, self._spacing, blocks.origin, blocks.extent, self.cells,
+        run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.there
+        far = self.search if self._rows.largest(ball, 0.0) > 0.0 else self.radius
+        place = (bins.start, *bins[2:], self.spacing, self.origin, self.extent)
+        run(k.find_near, count, near, far, *place)
+        run(
+            k.find_distances, self._corner_rows, near, self._corners, self.radius, far, volume, ball, self._profile,
+            position, *bins, self.shape, self.spacing, self.origin, self.extent, self.cells,
         )  # fmt: skip
         before, after = self.parts
-        self.team.run(
-            self.kernels.open_up, count, self.near, self._distance.reshape(-1), before, after, self.faces[1],
-            self.shape, blocks.extent,
+        is_cut = self.team.empty(self._count, np.int8)
+        run(
+            k.open_up, self._count, near, self._corners, before, after, self.faces[1], self.shape, self.extent, is_cut
         )  # fmt: skip
+        run(k.mark_cut_blocks, count, near, is_cut, prod(self.blocks.shape[:2]))
 
     @property
-    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+    def _corners(self) -> Any:
+        """Flat distances."""
+        return self._distance.there.reshape(-1)
+
+    @property
+    def parts(self) -> tuple[Any, Any]:
         """Flat fractions, old and new."""
-        return tuple(field.reshape(-1) for field in self.fractions)
+        return tuple(field.there.reshape(-1) for field in self.fractions)
 
     @property
-    def faces(self) -> tuple[np.ndarray, np.ndarray]:
+    def faces(self) -> tuple[Any, Any]:
         """Flat apertures, old and new."""
-        return tuple(field.reshape(-1) for field in self.apertures)
+        return tuple(field.there.reshape(-1) for field in self.apertures)
 
     def cut_cells(self, block: int) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, D) [x first] in memory of a block's cells that are cut, and the middles (n, D) [m] of their open
         corners, each by its distance from the wall."""
         D, blocks, grid = self.blocks.grid.dimensions, self.blocks, self.blocks.grid
-        part, extent = self.fractions[1][block, 0], blocks.extent[block]
+        part, extent = self.fractions[1].here()[block, 0], blocks.extent[block]
         inner = tuple(slice(g, g + n) for g, n in zip(grid.ghosts[::-1], extent[::-1], strict=True))
         place = np.argwhere((part[inner] > 0.0) & (part[inner] < 1.0))[:, ::-1] + grid.ghosts
         weight, middle = np.zeros(len(place)), np.zeros((len(place), D))
         for corner in product((0, 1), repeat=D):
             at = place + np.pad(corner, (0, 3 - D))
-            free = np.maximum(self._distance[block][tuple(at.T[::-1])], 0.0)
-            x = self._lower[:D] + (blocks.origin[block] - grid.ghosts + at)[:, :D] * self._spacing[:D]
+            free = np.maximum(self._distance.here()[block][tuple(at.T[::-1])], 0.0)
+            x = np.array(grid.lower[:D]) + (blocks.origin[block] - grid.ghosts + at)[:, :D] * grid.spacing[:D]
             weight, middle = weight + free, middle + free[:, None] * x
         return place, middle / weight[:, None]
 
-    def find_masters(self, kind: np.ndarray, master: np.ndarray, swept: np.ndarray) -> None:
-        """Which cells join which: kind (local blocks, 1, …) and master (local blocks, D, …); swept (…, k, …)."""
-        blocks = self.blocks
+    def find_masters(self, kind: Any, master: Any, swept: Any, fields: int) -> None:
+        """Which cells join which: flat kind (local blocks, 1, …), master (local blocks, D, …), swept (…, fields, …)."""
         self.team.run(
-            self.kernels.find_masters, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),
-            *self.parts, swept.reshape(-1), swept.shape[1], *self.faces, self.offsets, self._sequences, self.steps,
-            self.shape, blocks.origin, blocks.extent, self.cells,
+            self.kernels.find_masters, self._count, self.near.read, kind, master, *self.parts, swept, fields,
+            *self.faces, self.offsets, self._sequences, self.steps, self.shape, self.origin, self.extent, self.cells,
         )  # fmt: skip
 
-    def find_refuges(self, kind: np.ndarray, master: np.ndarray) -> None:
+    def find_refuges(self, kind: Any, master: Any) -> None:
         """Where the fluid of cells that are shut can go; after the ghosts of `kind` are known."""
-        blocks = self.blocks
         self.team.run(
-            self.kernels.find_refuges, blocks.local_count, self.near, kind.reshape(-1), master.reshape(-1),
-            self.parts[1], *self.faces, self.steps, self.shape, blocks.origin, blocks.extent, self.cells,
+            self.kernels.find_refuges, self._count, self.near.read, kind, master, self.parts[1], *self.faces,
+            self.steps, self.shape, self.origin, self.extent, self.cells,
         )  # fmt: skip
 
-    def is_band(self, cells: np.ndarray) -> np.ndarray:
-        """Which of these cells, numbered as they lie in memory, are in the band or covered."""
-        blocks = cells // int(self.shape.prod())
-        return (self.near[blocks] > 0) & (self._plain.reshape(-1)[cells] == 0)
+    def cover_evicted(self, kind: Any, master: Any) -> None:
+        """Cover the cells that are shut and have handed their fluid to a refuge."""
+        self.team.run(self.kernels.cover_evicted, self._count, kind, master, self.shape)
 
-    def lists(self, kind: np.ndarray, swept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The cells of the band around the wall, the covered and the loose ones (kernels/band.py); a block without them
-        is not near."""
-        near, extent, k = self.near, self.blocks.extent, self.kernels
-        whole, plain, kind = self._whole.reshape(-1), self._plain.reshape(-1), kind.reshape(-1)
-        share = (swept.reshape(-1), swept.shape[1])
-        blocks, rows = self.blocks.local_count, prod(self.blocks.shape[:2])
-        self.team.run(k.find_whole, blocks * rows, near, whole, kind, *self.parts, *share, self.shape)
-        counts = np.empty((blocks * rows, 3), dtype=np.int64)
-        self.team.run(
-            k.find_band, blocks * rows, near, plain, whole, kind, *share, self.offsets, self.steps, self.shape, extent,
-            counts,
+    def band_rows(self, cells: Any) -> Any:
+        """The rows of those of the `cells` (n,), numbered as they lie in memory, that are in the band or covered."""
+        mark = self.team.empty(cells.shape[0], np.int8)
+        self.team.run(self.kernels.mark_band, cells.shape[0], cells, self.near.read, self._plain, self.shape, mark)
+        return self._rows.marked(mark)[1]
+
+    def lists(self, kind: Any, swept: Any, fields: int) -> tuple[list[Any], np.ndarray]:
+        """The cells of the band around the wall, the covered and the loose ones (kernels/band.py), and how many of them
+        there are in each block (local blocks, 3); a block without them is not near."""
+        near, k, run, rows = self.near, self.kernels, self.team.run, self._count
+        whole, plain, share = self._whole, self._plain, (swept, fields)
+        run(k.find_whole, rows, near.read, whole, kind, *self.parts, *share, self.shape)
+        found = self.team.empty((rows, 3), np.int64)
+        run(
+            k.find_band, rows, near.read, plain, whole, kind, *share, self.offsets, self.steps, self.shape, self.extent,
+            found,
         )  # fmt: skip
-        in_blocks = counts.reshape(blocks, rows, 3).sum(axis=(1, 2))
-        near[(near != kernels.CUT) & (in_blocks == 0)] = 0
-        first = np.cumsum(counts, axis=0) - counts
-        lists = tuple(np.empty(n, dtype=np.int64) for n in counts.sum(axis=0))
-        self.team.run(k.list_band, blocks * rows, near, plain, kind, *share, self.shape, extent, first, *lists)
-        return lists
+        counts = self.team.get(found)
+        in_blocks = counts.reshape(self.blocks.local_count, -1, 3).sum(axis=1)
+        near.here()[(near.here() != kernels.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
+        near.changed()
+        first = self.team.array(np.cumsum(counts, axis=0) - counts)
+        lists = [self.team.empty(n, np.int64) for n in in_blocks.sum(axis=0)]
+        run(k.list_band, rows, near.read, plain, kind, *share, self.shape, self.extent, first, *lists)
+        return lists, in_blocks

@@ -2,40 +2,75 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
+
+from distfsi.device.seam import Columns
+from distfsi.mesh.rows import Rows
 
 FARTHEST = 1.25  # between points, in units of half a cell or of the particles' spacing, if that is more
 LONGEST = 4  # points along each axis of a particle
 PER_PARTICLE = LONGEST**3
 
 
-def wall_points(c: dict[str, np.ndarray], cell: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position (n, D) [m], volume (n,) [m^D] and number (n,) of the points of this rank's particles, whose columns are
-    `c`; `cell` [m]: the size of cells.
-
-    A particle that bonds hold fills its cube of the reference state as it is deformed: there are points along the
+class WallPoints:
+    """A particle that bonds hold fills its cube of the reference state as it is deformed: there are points along the
     principal axes of its deformation, so many that no gap shows in a body that is whole. Any other particle is one.
+
+    Only particles that are stretched so far come to the host.
     """
-    position, volume = c["position"], c["mass"] / c["density"]
-    if "deformation" not in c:
-        return position, volume, c["id"]
-    n, D = position.shape
-    side = c["volume"] ** (1.0 / D)
-    farthest = FARTHEST * np.maximum(0.5 * cell, side)
-    rows = np.flatnonzero((side * np.linalg.norm(c["deformation"], axis=1) > farthest) & (c["bond_count"] > 0))
-    F = c["deformation"][rows].reshape(-1, D, D)
-    stretches, axes = np.linalg.eigh((F[:, :, None, :] * F[:, None, :, :]).sum(axis=-1))
-    length = side[rows, None] * np.sqrt(np.maximum(stretches, 0.0))
-    count = np.ones((n, D), dtype=np.int64)
-    count[rows] = np.clip(np.ceil(length / farthest[rows, None]), 1, LONGEST)
-    step = np.zeros((n, D, D))
-    step[rows] = axes * (np.minimum(length, LONGEST * farthest[rows, None]) / count[rows])[:, None, :]
-    points = count.prod(axis=1)
-    parent = np.repeat(np.arange(n), points)
-    rank = np.arange(len(parent)) - np.repeat(np.cumsum(points) - points, points)
-    place, rest = position[parent], rank
-    for axis in range(D):
-        along = rest % count[parent, axis] - 0.5 * (count[parent, axis] - 1)
-        place = place + along[:, None] * step[parent, :, axis]
-        rest = rest // count[parent, axis]
-    return place, (volume / points)[parent], c["id"][parent] * PER_PARTICLE + rank
+
+    def __init__(self, rows: Rows, kernels: SimpleNamespace, cell: float):
+        """`cell` [m]: the size of cells."""
+        self._rows, self._device, self._kernels, self._cell = rows, rows.device, kernels, cell
+
+    def of(self, c: Columns) -> tuple[Any, Any, np.ndarray]:
+        """Position (n, D) [m] and volume (n, 1) [m^D], on the device, and number (n,) of the points of this rank's
+        particles, whose columns are `c`; the numbers are the particles' ids where there are no bonds."""
+        (position,), own = c.read("position"), len(c["id"])
+        volume = self._device.empty((own, 1))
+        self._device.run(self._kernels.find_volumes, own, *c.read("mass", "density"), volume)
+        if "deformation" not in c:
+            return position, volume, c["id"]
+        mark, number = self._device.empty(own, np.int8), c["id"] * PER_PARTICLE
+        shape = c.read("volume", "bond_count", "deformation")
+        self._device.run(self._kernels.mark_stretched, own, self._cell, FARTHEST, *shape, mark)
+        count, stretched = self._rows.marked(mark)
+        if count == 0:
+            return position, volume, number
+        taken = (self._rows.taken(a, stretched) for a in (position, volume, *c.read("volume", "deformation")))
+        points = self._split(*(self._device.get(a) for a in taken))
+        rows = self._device.get(stretched)
+        others = np.delete(np.arange(own), rows)
+        chosen = self._device.array(np.concatenate([others, own + np.arange(len(points[0]))]))
+        place, size = (
+            self._rows.taken(all, chosen, self._device.array(new))
+            for all, new in zip((position, volume), points[:2], strict=True)
+        )
+        parent, rank = points[2:]
+        return place, size, np.concatenate([number[others], number[rows][parent] + rank])
+
+    def _split(
+        self, position: np.ndarray, volume: np.ndarray, reference: np.ndarray, deformation: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """Positions (m, D) and volumes (m, 1) of the points of particles at `position` (n, D) with `volume` (n, 1), which
+        was `reference` (n,); which of them each point is of, and its rank among the particle's."""
+        n, D = position.shape
+        side = reference ** (1.0 / D)
+        farthest = FARTHEST * np.maximum(0.5 * self._cell, side)
+        F = deformation.reshape(-1, D, D)
+        stretches, axes = np.linalg.eigh((F[:, :, None, :] * F[:, None, :, :]).sum(axis=-1))
+        length = side[:, None] * np.sqrt(np.maximum(stretches, 0.0))
+        count = np.clip(np.ceil(length / farthest[:, None]), 1, LONGEST).astype(np.int64)
+        step = axes * (np.minimum(length, LONGEST * farthest[:, None]) / count)[:, None, :]
+        points = count.prod(axis=1)
+        parent = np.repeat(np.arange(n), points)
+        rank = np.arange(len(parent)) - np.repeat(np.cumsum(points) - points, points)
+        place, rest = position[parent], rank
+        for axis in range(D):
+            along = rest % count[parent, axis] - 0.5 * (count[parent, axis] - 1)
+            place = place + along[:, None] * step[parent, :, axis]
+            rest = rest // count[parent, axis]
+        return place, (volume / points[:, None])[parent], parent, rank
