@@ -278,8 +278,8 @@ def threads_of_rank(communicator: Communicator) -> int:
 def gpu_of_rank(scene: Scene, communicator: Communicator) -> Device:
     """Collective. The GPU on which this rank computes the scene. Raises InputError on all ranks where it cannot."""
     gpu, faults = None, []
-    if (scene.solid and scene.fluid) or scene.output.peaks:
-        faults.append("--gpu: coupled scenes and peaks are computed on the CPU only; run without --gpu")
+    if scene.solid and scene.fluid and scene.coupling.scheme == "paper":
+        faults.append('--gpu: coupling.scheme "paper" is computed on the CPU only; run without --gpu')
     else:
         try:
             gpu = gpu_of(communicator.local_rank)

@@ -13,9 +13,11 @@ from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostRuntime
 from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
+from distfsi.scene import load
 from distfsi.scene.description import Ball, FluidState, HalfSpace, Performance, Region
 from distfsi.simulation import Simulation
 from fluids import MATERIALS
+from launch import ROOT
 from mpi_solid import bursting_ball, colliding_discs, step
 from tubes import scene_of
 
@@ -25,6 +27,12 @@ SCENES = {
     "bubble, float32": (("air", "helium"), 2, {"precision": "float32"}),
 }
 STEPS = 4
+COARSE = (
+    "domain.cells=[32, 32]",
+    "performance.block_cells=[8, 8]",
+    "solid.bodies.tube.spacing=1 mm",
+    "output.peaks=true",
+)
 SOLIDS = {colliding_discs: (20, (True, False)), bursting_ball: (62, (True,))}  # steps, late or not
 
 
@@ -83,6 +91,18 @@ def solid_result(case, steps, device):
     return [*part.columns.values(), *map(np.atleast_1d, books)]
 
 
+def coupled_result(device):
+    """Fluid, particles, books and peaks of a coarse steel tube after 50 steps."""
+    simulation = Simulation.of(load(ROOT / "inputs/steel_tube.toml", COARSE), Communicator(), 1, device=device)
+    for _ in range(50):
+        simulation.step()
+    fluid, coupling = simulation.fluid, simulation.coupling
+    cells = [fluid.cells(block) for block in range(simulation.blocks.local_count)]
+    books = [*fluid.totals(coupling.volume), *coupling.ledger().values(), np.array([simulation.time])]
+    peaks = simulation.watchers[0].snapshot()["cells"]["fields"]
+    return [*cells, np.ascontiguousarray(peaks), *simulation.solid.columns.values(), *books]
+
+
 def same(results, expected):
     """Whether all ranks have the same bits."""
     mine = all(a.tobytes() == b.tobytes() for a, b in zip(results, expected, strict=True))
@@ -124,17 +144,26 @@ def check_solids():
         print(f"{case.__name__}: same bits")
 
 
+def check_coupled():
+    """A coupled scene with peaks, as late as the order allows."""
+    assert same(coupled_result(Gpu(HostRuntime())), coupled_result(Team(1)))
+    print("coupled: same bits")
+
+
 def nothing(*_, **__):
     """In the place of something that is needed."""
 
 
 def check_gpu():
     """Every scene on the GPUs of this node."""
+    local_rank = Communicator().local_rank
     for name in SCENES:
-        expected = result(name, Team(1))
-        gpu = cuda.gpu_of(Communicator().local_rank)
-        assert same(result(name, gpu), expected), name
+        assert same(result(name, cuda.gpu_of(local_rank)), result(name, Team(1))), name
         print(f"{name}: same bits on {cuda.gpu_name(0)}")
+    for case, (steps, _) in SOLIDS.items():
+        expected = solid_result(case, steps, Team(1))
+        alike = same(solid_result(case, steps, cuda.gpu_of(local_rank)), expected)
+        print(f"{case.__name__}: {'same bits' if alike else 'other bits'} on {cuda.gpu_name(0)}")
 
 
 def check_mutants():
@@ -195,4 +224,10 @@ MUTANTS = {
 
 if __name__ == "__main__":
     install_abort_on_exception(Communicator())
-    {"scenes": check_scenes, "solids": check_solids, "mutants": check_mutants, "gpu": check_gpu}[sys.argv[1]]()
+    {
+        "scenes": check_scenes,
+        "solids": check_solids,
+        "coupled": check_coupled,
+        "mutants": check_mutants,
+        "gpu": check_gpu,
+    }[sys.argv[1]]()

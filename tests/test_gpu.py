@@ -31,6 +31,11 @@ def test_solids_have_the_bits_of_the_cpu(mpiexec):
     assert mpiexec(2, SCRIPT, "solids").count("same bits") == 2 * 2
 
 
+def test_a_coupled_scene_has_the_bits_of_the_cpu(mpiexec):
+    """50 steps of the coarse steel tube with peaks, on 2 ranks."""
+    assert mpiexec(2, SCRIPT, "coupled").count("same bits") == 2
+
+
 @pytest.mark.parametrize("form", ["updated_lagrangian", "total_lagrangian"])
 def test_a_step_of_a_solid_copies_no_columns(form):
     """What goes between host and device in a step in which no particle changes blocks."""
@@ -97,8 +102,8 @@ def test_a_rank_without_gpu_says_why(monkeypatch):
         cuda.gpu_of(0)
 
 
-@pytest.mark.parametrize("path", ["inputs/steel_tube.toml", "inputs/sod.toml"])
-def test_a_run_that_gpus_cannot_do_is_refused(monkeypatch, path):
+@pytest.mark.parametrize(("scheme", "why"), [("paper", "on the CPU only"), ("cut_cells", "CuPy is not installed")])
+def test_a_run_that_gpus_cannot_do_is_refused(monkeypatch, scheme, why):
     monkeypatch.setitem(sys.modules, "cupy", None)
-    with pytest.raises(InputError, match="coupled scenes and peaks" if "tube" in path else "CuPy is not installed"):
-        gpu_of_rank(load(ROOT / path), Communicator())
+    with pytest.raises(InputError, match=why):
+        gpu_of_rank(load(ROOT / "inputs/steel_tube.toml", (f"coupling.scheme={scheme}",)), Communicator())

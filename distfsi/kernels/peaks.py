@@ -1,7 +1,7 @@
 """The pass that remembers the peaks of the flow in every cell, once per step and only where a scene asks for it."""
 
 from distfsi.device.markers import driver, load, row, store
-from distfsi.kernels.coupling import COVERED, cell_at
+from distfsi.kernels.coupling import COVERED, cells_of_row
 from distfsi.physics.peaks import arrival, dynamic_pressure, overpressure, positive_impulse
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import VARIABLES
@@ -33,12 +33,12 @@ def peaks_row(U, U_old, Q, K, u, q, k, su, n, ambient, threshold, time, dt):
 def remember_peaks(begin, end, U, U_old, peaks, kind, shape, extent, ambient, threshold, time, dt):
     """peaks (blocks, 4, Z, Y, X) float64 takes in the step of `dt` [s] from U_old to U, which ends at `time` [s].
 
-    kind (blocks, 1, Z, Y, X): what the coupling says of each cell; `ambient`, `threshold` [Pa].
+    kind (blocks, 1, Z, Y, X): what the coupling says of each cell; `ambient`, `threshold` [Pa]. An item is a row of
+    cells along x.
     """
     cells = shape[0] * shape[1] * shape[2]
-    for b in range(begin, end):
-        for k in range(extent[b, 2]):
-            for j in range(extent[b, 1]):
-                at = cell_at(b, 0, j, k, shape)
-                u, q = at + b * (VARIABLES - 1) * cells, at + b * 3 * cells
-                peaks_row(U, U_old, peaks, kind, u, q, at, cells, extent[b, 0], ambient, threshold, time, dt)
+    for r in range(begin, end):
+        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
+        u, q = at + b * (VARIABLES - 1) * cells, at + b * 3 * cells
+        n = cells_of_row(r, b, shape, extent)
+        peaks_row(U, U_old, peaks, kind, u, q, at, cells, n, ambient, threshold, time, dt)

@@ -124,9 +124,9 @@ class Fluid:
         self._buffers[0].changed()
 
     @property
-    def previous(self) -> np.ndarray:
-        """The state before the last step, until the next one begins."""
-        return self._buffers[1].here()
+    def previous(self) -> Any:
+        """The state before the last step on the device, until the next one begins."""
+        return self._buffers[1].read
 
     def input_of(self, stage: Stage) -> Any:
         """The state that a stage starts from, on the device."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 
 from distfsi.device.seam import Pair
@@ -23,7 +25,7 @@ class Peaks:
     """What each cell remembers: highest overpressure [Pa], its positive impulse [Pa s], the first arrival [s] (inf: not
     yet), highest dynamic pressure [Pa]. Time that a cell is covered by a solid does not count.
 
-    fields: (local blocks, 4, Z, Y, X) float64
+    fields: (local blocks, 4, Z, Y, X) float64 on host and device
     """
 
     name = "peaks"
@@ -31,37 +33,41 @@ class Peaks:
     def __init__(self, peaks: description.Peaks, fluid: Fluid, coupling: Coupling | None):
         self.peaks, self.fluid, self.coupling = peaks, fluid, coupling
         model, blocks = fluid.model, fluid.blocks
-        real = fluid.state.dtype.name
+        real = fluid.there.dtype.name
         self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
-        self.fields = blocks.allocate(len(NAMES))
-        self.fields[:, kernels.ARRIVAL] = np.inf
+        fields = blocks.allocate(len(NAMES))
+        fields[:, kernels.ARRIVAL] = np.inf
+        self.fields = Pair(fluid.team, fields)
         self._kind = coupling.kind if coupling else Pair(fluid.team, blocks.allocate(1, np.uint8))
-        self._shape = np.array(blocks.shape)
+        self._shape, self._extent = fluid.team.array(np.array(blocks.shape)), fluid.team.array(blocks.extent)
+        self._rows = blocks.local_count * prod(blocks.shape[:2])
 
     def after_step(self, simulation) -> None:
         """Take in the step just made; before the first one the state at the start."""
-        blocks, fluid = self.fluid.blocks, self.fluid
-        before = fluid.previous if simulation.steps else fluid.state
+        fluid, peaks = self.fluid, self.peaks
+        before = fluid.previous if simulation.steps else fluid.there
         fluid.team.run(
-            self.kernels.remember_peaks, blocks.local_count, fluid.state, before, self.fields, self._kind.read,
-            self._shape, blocks.extent, self.peaks.ambient_pressure, self.peaks.arrival_overpressure, simulation.time,
+            self.kernels.remember_peaks, self._rows, fluid.there, before, self.fields.there, self._kind.read,
+            self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure, simulation.time,
             simulation.dt,
         )  # fmt: skip
 
     def outputs(self, covered: np.ndarray | None) -> dict[str, np.ndarray]:
         """Fields for the output files: (local blocks, bz, by, bx), NaN where covered or, for the arrival, too early."""
+        fields = self.fields.here()
         return {
-            name: padded(self.fluid, np.where(np.isinf(self.fields[:, v]), np.nan, self.fields[:, v]), covered)
+            name: padded(self.fluid, np.where(np.isinf(fields[:, v]), np.nan, fields[:, v]), covered)
             for v, name in NAMES.items()
         }
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
-        return {"cells": {"fields": self.fluid.blocks.without_ghosts(self.fields)}}
+        return {"cells": {"fields": self.fluid.blocks.without_ghosts(self.fields.here())}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.fluid.blocks.without_ghosts(self.fields)[:] = snapshot["cells"]["fields"]
+        self.fluid.blocks.without_ghosts(self.fields.here())[:] = snapshot["cells"]["fields"]
+        self.fields.changed()
 
 
 def schlieren(fluid: Fluid, covered: np.ndarray | None) -> np.ndarray:
