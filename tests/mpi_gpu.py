@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from itertools import cycle
 
 import numpy as np
@@ -156,14 +157,21 @@ def nothing(*_, **__):
 
 def check_gpu():
     """Every scene on the GPUs of this node."""
-    local_rank = Communicator().local_rank
+    gpu, name_of_gpu = partial(cuda.gpu_of, Communicator().local_rank), cuda.gpu_name(0)
     for name in SCENES:
-        assert same(result(name, cuda.gpu_of(local_rank)), result(name, Team(1))), name
-        print(f"{name}: same bits on {cuda.gpu_name(0)}")
-    for case, (steps, _) in SOLIDS.items():
-        expected = solid_result(case, steps, Team(1))
-        alike = same(solid_result(case, steps, cuda.gpu_of(local_rank)), expected)
-        print(f"{case.__name__}: {'same bits' if alike else 'other bits'} on {cuda.gpu_name(0)}")
+        assert same(result(name, gpu()), result(name, Team(1))), name
+        print(f"{name}: same bits on {name_of_gpu}")
+    others = [partial(solid_result, case, steps) for case, (steps, _) in SOLIDS.items()] + [coupled_result]
+    for other in others:
+        assert close(other(gpu()), other(Team(1)))
+        print(f"solid: close on {name_of_gpu}")
+
+
+def close(results, expected):
+    """Whether all ranks have nearly the same; the last bits of powers and logarithms are the library's."""
+    pairs = [(a.astype(float), b.astype(float)) for a, b in zip(results, expected, strict=True)]
+    mine = all(np.allclose(a, b, rtol=0.0, atol=1e-8 * np.abs(b).max(initial=0.0)) for a, b in pairs)
+    return all(Communicator().allgather(mine))
 
 
 def check_mutants():
@@ -224,10 +232,5 @@ MUTANTS = {
 
 if __name__ == "__main__":
     install_abort_on_exception(Communicator())
-    {
-        "scenes": check_scenes,
-        "solids": check_solids,
-        "coupled": check_coupled,
-        "mutants": check_mutants,
-        "gpu": check_gpu,
-    }[sys.argv[1]]()
+    checks = {"scenes": check_scenes, "solids": check_solids, "coupled": check_coupled, "mutants": check_mutants}
+    (checks | {"gpu": check_gpu})[sys.argv[1]]()

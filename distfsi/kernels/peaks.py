@@ -1,10 +1,10 @@
 """The pass that remembers the peaks of the flow in every cell, once per step and only where a scene asks for it."""
 
 from distfsi.device.markers import driver, load, row, store
-from distfsi.kernels.coupling import COVERED, cells_of_row
+from distfsi.kernels.coupling import COVERED
 from distfsi.physics.peaks import arrival, dynamic_pressure, overpressure, positive_impulse
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import VARIABLES
+from distfsi.physics.symbols import DIMENSIONS, VARIABLES
 
 OVERPRESSURE, IMPULSE, ARRIVAL, DYNAMIC_PRESSURE = 0, 1, 2, 3  # what is remembered
 
@@ -30,15 +30,17 @@ def peaks_row(U, U_old, Q, K, u, q, k, su, n, ambient, threshold, time, dt):
 
 
 @driver
-def remember_peaks(begin, end, U, U_old, peaks, kind, shape, extent, ambient, threshold, time, dt):
+def remember_peaks(begin, end, layers, U, U_old, peaks, kind, shape, extent, ambient, threshold, time, dt):
     """peaks (blocks, 4, Z, Y, X) float64 takes in the step of `dt` [s] from U_old to U, which ends at `time` [s].
 
-    kind (blocks, 1, Z, Y, X): what the coupling says of each cell; `ambient`, `threshold` [Pa]. An item is a row of
-    cells along x.
+    layers: of ghosts; kind (blocks, 1, Z, Y, X): what the coupling says of each cell; `ambient`, `threshold` [Pa]. An
+    item is a row of cells along x, numbered as it lies in memory.
     """
     cells = shape[0] * shape[1] * shape[2]
+    gy, gz = (layers if DIMENSIONS > 1 else 0), (layers if DIMENSIONS > 2 else 0)
     for r in range(begin, end):
-        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
+        b, at = r // (shape[0] * shape[1]), r * shape[2] + layers
+        j, k = r % shape[1] - gy, r // shape[1] % shape[0] - gz
         u, q = at + b * (VARIABLES - 1) * cells, at + b * 3 * cells
-        n = cells_of_row(r, b, shape, extent)
-        peaks_row(U, U_old, peaks, kind, u, q, at, cells, n, ambient, threshold, time, dt)
+        if j >= 0 and j < extent[b, 1] and k >= 0 and k < extent[b, 2]:
+            peaks_row(U, U_old, peaks, kind, u, q, at, cells, extent[b, 0], ambient, threshold, time, dt)

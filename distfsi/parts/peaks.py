@@ -40,6 +40,7 @@ class Peaks:
         self.fields = Pair(fluid.team, fields)
         self._kind = coupling.kind if coupling else Pair(fluid.team, blocks.allocate(1, np.uint8))
         self._shape, self._extent = fluid.team.array(np.array(blocks.shape)), fluid.team.array(blocks.extent)
+        self._layers = blocks.grid.ghost_layers
         self._rows = blocks.local_count * prod(blocks.shape[:2])
 
     def after_step(self, simulation) -> None:
@@ -47,7 +48,7 @@ class Peaks:
         fluid, peaks = self.fluid, self.peaks
         before = fluid.previous if simulation.steps else fluid.there
         fluid.team.run(
-            self.kernels.remember_peaks, self._rows, fluid.there, before, self.fields.there, self._kind.read,
+            self.kernels.remember_peaks, self._rows, self._layers, fluid.there, before, self.fields.there, self._kind.read,
             self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure, simulation.time,
             simulation.dt,
         )  # fmt: skip

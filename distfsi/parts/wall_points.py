@@ -55,8 +55,8 @@ class WallPoints:
     def _split(
         self, position: np.ndarray, volume: np.ndarray, reference: np.ndarray, deformation: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """Positions (m, D) and volumes (m, 1) of the points of particles at `position` (n, D) with `volume` (n, 1), which
-        was `reference` (n,); which of them each point is of, and its rank among the particle's."""
+        """Positions (m, D) and volumes (m, 1) of the points of particles (n, …) whose volume was `reference`; which of
+        them each point is of, and its rank among the particle's."""
         n, D = position.shape
         side = reference ** (1.0 / D)
         farthest = FARTHEST * np.maximum(0.5 * self._cell, side)
