@@ -41,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("input", help="the scene, a TOML file")
         _add_overrides(command)
     run.add_argument("--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)")
-    run.add_argument("--gpu", action="store_true", help="compute on the node's GPUs; for scenes without solids")
+    run.add_argument("--gpu", action="store_true", help="compute on the node's GPUs; not for the paper's coupling")
     run.add_argument(
         "--restart",
         metavar="auto|FILE",

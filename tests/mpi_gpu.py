@@ -187,6 +187,16 @@ def check_mutants():
             found = True
         assert found, name
         print(f"without {name}: found")
+    expected = solid_result(colliding_discs, 2, Team(1))
+    for name, take_away in SOLID_MUTANTS.items():
+        gpu = Gpu(HostRuntime())
+        take_away(gpu)
+        try:
+            found = not same(solid_result(colliding_discs, 2, gpu), expected)
+        except Diverged:  # on all ranks
+            found = True
+        assert found, name
+        print(f"particles without {name}: found")
 
 
 def without(name):
@@ -227,6 +237,12 @@ MUTANTS = {
     "the wait for the ghosts": without_order(Queue.MAIN),
     "the wait for the cells": without_order(Queue.BESIDE),
     "the wait before looking": without_wait_of_get,
+}
+SOLID_MUTANTS = {  # without the wait for the rows to pack there is no result at all
+    "the wait before sending": without("finish_beside"),
+    "the copy of what is sent": without("take"),
+    "the copy of what came": without("put"),
+    "the wait for the ghosts": without_order(Queue.MAIN),
 }
 
 

@@ -52,7 +52,7 @@ def test_a_step_of_a_solid_copies_no_columns(form):
 
 def test_every_wait_copy_and_order_is_needed(mpiexec):
     """On 2 ranks."""
-    assert mpiexec(2, SCRIPT, "mutants").count("found") == 14
+    assert mpiexec(2, SCRIPT, "mutants").count("found") == 2 * (7 + 4)
 
 
 def test_arrays_of_the_device_stay_there():

@@ -307,7 +307,6 @@ class GhostPlan:
             return device.empty(0)
         leaving, arriving = (device.pinned(n * stride, np.float64) for n in (route.leaving, route.arriving))
         there, arrived = device.beneath(leaving), device.beneath(arriving)
-        device.finish_beside()
         with device.beside():
             for array, width, column in zip(arrays, widths, columns, strict=True):
                 row = (self._rows, int(width), array.reshape(-1), stride, int(column), there)

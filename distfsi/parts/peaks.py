@@ -48,9 +48,9 @@ class Peaks:
         fluid, peaks = self.fluid, self.peaks
         before = fluid.previous if simulation.steps else fluid.there
         fluid.team.run(
-            self.kernels.remember_peaks, self._rows, self._layers, fluid.there, before, self.fields.there, self._kind.read,
-            self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure, simulation.time,
-            simulation.dt,
+            self.kernels.remember_peaks, self._rows, self._layers, fluid.there, before, self.fields.there,
+            self._kind.read, self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure,
+            simulation.time, simulation.dt,
         )  # fmt: skip
 
     def outputs(self, covered: np.ndarray | None) -> dict[str, np.ndarray]:
