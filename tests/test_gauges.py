@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from distfsi.device.seam import Pair
 from distfsi.errors import InputError
 from distfsi.kernels.coupling import COVERED
 from distfsi.mesh.communicator import Communicator
@@ -287,7 +288,8 @@ def test_interpolation_leaves_out_what_is_covered(box):
     for block in range(box.fluid.blocks.local_count):
         x = box.fluid.blocks.cell_centers(block)[0]
         box.fluid.active(kind, block)[..., x > 1.0] = COVERED
-    sampler = FluidSampler(box.fluid, SimpleNamespace(kind=kind), np.array([[0.99, 0.3], [1.01, 0.3], [0.2, 0.2]]))
+    coupling = SimpleNamespace(kind=Pair(box.fluid.team, kind))
+    sampler = FluidSampler(box.fluid, coupling, np.array([[0.99, 0.3], [1.01, 0.3], [0.2, 0.2]]))
     density = sampler.values()[:, 1]
     assert density[0] == 5.0 and np.isnan(density[1]) and density[2] == 5.0
 

@@ -93,13 +93,15 @@ class CupyRuntime:
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         import cupyx
 
-        return cupyx.empty_pinned(count, dtype)
+        return cupyx.empty_pinned(max(count, 1), dtype)[:count]
 
     def upload(self, there: Any, host: np.ndarray, queue: Queue) -> None:
-        there.set(host, stream=self._streams[queue])
+        if host.size:
+            there.set(host, stream=self._streams[queue])
 
     def download(self, host: np.ndarray, there: Any, queue: Queue) -> None:
-        there.get(stream=self._streams[queue], out=host, blocking=False)
+        if host.size:
+            there.get(stream=self._streams[queue], out=host, blocking=False)
 
     def order(self, first: Queue, then: Queue) -> None:
         self._streams[then].wait_event(self._streams[first].record())

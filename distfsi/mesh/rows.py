@@ -10,6 +10,7 @@ import numpy as np
 from distfsi.device.seam import Device
 
 CHUNK = 128  # rows that one thread reduces
+FEW = 64  # chunks that are not worth sharing among threads
 
 
 class Rows:
@@ -63,7 +64,9 @@ class Rows:
 
     def reduce(self, kernel: Any, rows: int, *arguments: Any) -> None:
         """Run a kernel that takes the number of rows in a chunk first and does a chunk at a time."""
-        self.device.run(kernel, chunks(rows), CHUNK, *arguments)
+        count = chunks(rows)
+        run = self.device.run if count > FEW else self.device.run_few
+        run(kernel, count, CHUNK, *arguments)
 
     def taken(self, values: Any, rows: Any, others: Any = None) -> Any:
         """The `rows` (m,) of `values` (n, …) and, behind them, of `others` of the same type."""
