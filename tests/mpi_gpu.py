@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 from functools import partial
 from itertools import cycle
@@ -93,15 +94,27 @@ def solid_result(case, steps, device):
 
 
 def coupled_result(device):
-    """Fluid, particles, books and peaks of a coarse steel tube after 50 steps."""
+    """Fluid, particles, books and peaks of a coarse steel tube after 50 steps, and one step after a restart there."""
     simulation = Simulation.of(load(ROOT / "inputs/steel_tube.toml", COARSE), Communicator(), 1, device=device)
     for _ in range(50):
         simulation.step()
+    state, snapshots = coupled_state(simulation), {n: part.snapshot() for n, part in simulation.kept().items()}
+    snapshots = copy.deepcopy(snapshots)
+    simulation.step()
+    for name, part in simulation.kept().items():
+        part.restore(snapshots[name])
+    simulation.step()
+    return state + coupled_state(simulation)
+
+
+def coupled_state(simulation):
+    """What there is of it."""
     fluid, coupling = simulation.fluid, simulation.coupling
-    cells = [fluid.cells(block) for block in range(simulation.blocks.local_count)]
+    cells = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
     books = [*fluid.totals(coupling.volume), *coupling.ledger().values(), np.array([simulation.time])]
     peaks = simulation.watchers[0].snapshot()["cells"]["fields"]
-    return [*cells, np.ascontiguousarray(peaks), *simulation.solid.columns.values(), *books]
+    columns = [column.copy() for column in simulation.solid.columns.values()]
+    return [*cells, peaks.copy(), *columns, *books]
 
 
 def same(results, expected):

@@ -1,6 +1,7 @@
 """Fluids and solids on a GPU's queues and memory, which the host stands in for: the bits of the CPU on any number of
 ranks."""
 
+import filecmp
 import sys
 
 import numpy as np
@@ -14,7 +15,7 @@ from distfsi.device.host import HostArray, HostRuntime
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
-from distfsi.simulation import Simulation, gpu_of_rank
+from distfsi.simulation import Simulation, gpu_of_rank, run
 from distfsi.study import works
 from launch import ROOT
 
@@ -32,8 +33,21 @@ def test_solids_have_the_bits_of_the_cpu(mpiexec):
 
 
 def test_a_coupled_scene_has_the_bits_of_the_cpu(mpiexec):
-    """50 steps of the coarse steel tube with peaks, on 2 ranks."""
+    """50 steps of the coarse steel tube with peaks, and one more after a restart, on 2 ranks."""
     assert mpiexec(2, SCRIPT, "coupled").count("same bits") == 2
+
+
+@pytest.mark.full
+def test_a_run_leaves_the_files_of_the_cpu(monkeypatch, tmp_path):
+    """Bonded particles in a fluid."""
+    monkeypatch.setattr("distfsi.simulation.gpu_of", lambda rank: Gpu(HostRuntime()))
+    changes = (*mpi_gpu.COARSE, "solid.form=total_lagrangian", "output.schlieren=true", "time.maximum_steps=8")
+    for name in ("cpu", "gpu"):
+        given = (*changes, "output.fields_every=3e-7", f'output.directory="{tmp_path / name}"')
+        run(load(ROOT / "inputs/steel_tube.toml", given), Communicator(), 1, on_gpu=name == "gpu")
+    files = sorted(path.name for path in (tmp_path / "cpu").glob("*.*") if path.name != "run.json")
+    assert "history.csv" in files and "particles-000001.vtkhdf" in files
+    assert filecmp.cmpfiles(tmp_path / "cpu", tmp_path / "gpu", files, shallow=False) == (files, [], [])
 
 
 @pytest.mark.parametrize("form", ["updated_lagrangian", "total_lagrangian"])
