@@ -1,5 +1,6 @@
 """Cut cells: geometry, uniform flow kept, pistons, closed books, thin plates that do not leak."""
 
+from dataclasses import replace
 from itertools import product
 from math import sqrt
 
@@ -282,6 +283,63 @@ def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold():
         mass, shut_in, open_way = low_side(case)
         assert not open_way
     assert abs(mass + shut_in - before) < 1e-12 * before
+
+
+# ---- cracks ---------------------------------------------------------------------------------------------------------
+
+
+def positive(case):
+    """Whether density and pressure are, wherever there is gas."""
+    W = primitives(case)[:, volumes(case) > 0.0]
+    return W[0].min() > 0.0 and W[-1].min() > 0.0
+
+
+@pytest.mark.parametrize(("thickness", "narrow", "wide"), [(3.0, 0.8, 1.3), (1.0, 1.5, 2.2)])
+def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, narrow, wide):
+    """Two halves of a plate part, pressure 10 : 1. Widths in cells; a plate of one cell counts as thicker than it is on
+    all sides, so there it takes two."""
+    h, speed = 1.0 / 24, 0.2
+    low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
+    halves = [
+        rigid(Box((low, -0.3), (high, 0.48)), 0.5 * h, (0.0, -speed)),
+        rigid(Box((low, 0.48), (high, 1.3)), 0.5 * h, (0.0, speed)),
+    ]
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(10.0, 10.0, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
+    case = coupled(halves, regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24)
+    before, width, opened = low_side(case)[0], 0.0, None
+    while width < wide + 0.5:
+        case.step()
+        width = 2.0 * speed * case.simulation.time / h
+        mass, shut_in, open_way = low_side(case)
+        if open_way and opened is None:
+            opened = width
+        assert opened or mass / before - 1.0 < 1e-12
+        assert positive(case)
+    assert narrow < opened < wide
+
+
+TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in ((1.0, 10.0), (3.0, 100.0)))]
+
+
+@pytest.mark.parametrize(("thickness", "ratio"), TORN)
+def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
+    """Its bonds break, gas passes, no state is negative, and all books close."""
+    h, fails = 1.0 / 24, d.PrincipalStress(1.0, 1e-3, d.Scatter(8.0, 1.0 / 24, 1))
+    low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
+    plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(sqrt(ratio), ratio, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
+    case = coupled(
+        [plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian"
+    )  # fmt: skip
+    c = case.solid.columns
+    c["velocity"][:, 1] = 0.6 * np.sign(c["position"][:, 1] - 0.48)
+    before, passed = case.balance(), False
+    while case.simulation.time < 0.1:
+        case.step()
+        passed = passed or low_side(case)[2]
+        assert positive(case)
+    assert passed and len(case.solid.pieces()["piece"]) > 1
+    assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
 
 
 # ---- restart --------------------------------------------------------------------------------------------------------
