@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "steel_tube",
+    "steel_tube fragments",
     "undex_2d",
     "shock_bubble",
     "shock_bubble_speed",

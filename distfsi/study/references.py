@@ -77,6 +77,22 @@ STEEL_TUBE_JOHNSON_COOK = (
 )
 """With the Johnson-Cook strength of inputs/steel_tube.toml, by the same computation."""
 
+
+class TubeFragments(NamedTuple):
+    """Mean width and thickness [m] of the tube's fragments, and what is told of their speed."""
+
+    source: str
+    width: float
+    thickness: float
+    speed: str
+
+
+TUBE_FRAGMENTS = (
+    TubeFragments("experiment", 7.86e-3, 3.3e-3, "not told; 1.4 to 1.8 km/s by Gurney and by the computations above"),
+    TubeFragments("the paper", 7.23e-3, 3.7e-3, "up to 1000 m/s"),
+)
+"""The paper's Table 9: Tang, Gu, Li, Explosion and Shock Waves 23 (2003) 529, and its own computation."""
+
 GURNEY_VELOCITY = (1695.0, 1786.0)
 """Range of Gurney's final velocity of the same tube for sqrt(2E) = 2316 to 2440 m/s [m/s]."""
 

@@ -1,0 +1,180 @@
+"""The steel tube with failure: when it breaks, and how wide, thick and fast its fragments are, over a few specimens.
+
+Fragments are what intact bonds hold together. The constants of the failure are of the kind published for medium carbon
+steel; the paper names none. Those of the paper and of the experiment it compares with are printed beside.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
+from distfsi.output.fields import read_cells, read_particles, series
+from distfsi.output.history import read_history
+from distfsi.scene import load
+from distfsi.simulation import run
+from distfsi.study.references import TUBE_FRAGMENTS
+from distfsi.study.steel_tube import INPUT, WIDE
+
+DIRECTORY = Path("out/study_steel_tube_fragments")
+SEEDS = (1, 2, 3)
+FAILURE = (
+    'solid.bodies.tube.failure={{kind="johnson_cook",D1=0.10,D2=0.76,D3=-1.57,D4=0.005,D5=-0.84,'
+    'fracture_energy="35 kJ/m2",scatter={{modulus=10,size="1 mm",seed={seed}}}}}'
+)
+SMALLEST = 8  # particles of a fragment that is measured
+SHOWN = (10e-6, 20e-6, 30e-6, 40e-6)  # the times of the pictures [s]
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """A specimen: time [s] and r/r0 when a first piece has parted; its fragments' widths, thicknesses [m] and speeds
+    [m/s] at the end, and the share of the mass that they hold; all else is dust or touches a plane of symmetry."""
+
+    seed: int
+    broken_at: float
+    expansion: float
+    width: np.ndarray
+    thickness: np.ndarray
+    speed: np.ndarray
+    share: float
+
+
+def burst(communicator: Communicator, seed: int, overrides: Sequence[str]) -> Path:
+    """Collective. Run a specimen; its directory."""
+    directory = DIRECTORY / f"seed_{seed}"
+    scene = load(
+        INPUT,
+        [*WIDE, FAILURE.format(seed=seed), 'output.fields_every="1 us"', f'output.directory="{directory}"', *overrides],
+    )
+    run(scene, communicator)
+    return directory
+
+
+def fragments(directory: Path, seed: int) -> Fragments:
+    """What a run has left in its directory."""
+    frames = series(directory, "particles")
+    inner = np.hypot(*read_particles(frames[0][1])[1]["position"][:, :2].T)
+    rows, start = np.flatnonzero(inner < inner.min() * (1.0 + 1e-6)), inner.min()
+    broken_at, expansion = np.nan, np.nan
+    for time, path in frames:
+        p = read_particles(path)[1]
+        order = np.argsort(p["id"])
+        if np.unique(p["piece"], return_counts=True)[1].max() < len(order):
+            broken_at, expansion = time, float(np.hypot(*p["position"][order][rows, :2].T).mean() / start)
+            break
+    return Fragments(seed, broken_at, expansion, *_measured(read_particles(frames[-1][1])[1]))
+
+
+def _measured(p: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Width, thickness, speed of all fragments, and their share of the particles.
+
+    A fragment counts as the rectangle with the same second moments.
+    """
+    x, v = p["position"][:, :2], p["velocity"][:, :2]
+    r = np.hypot(*x.T)
+    found, held = [], 0
+    for piece, count in zip(*np.unique(p["piece"], return_counts=True), strict=True):
+        rows = p["piece"] == piece
+        middle = x[rows].mean(axis=0)
+        if count < SMALLEST or (middle < 0.1 * r[rows].mean()).any():
+            continue
+        low, high = np.sqrt(12.0 * np.linalg.eigvalsh(np.cov(x[rows].T, bias=True)) * count / max(count - 1.0, 1.0))
+        found.append((high, low, float(np.hypot(*v[rows].mean(axis=0)))))
+        held += count
+    width, thickness, speed = np.array(found).reshape(-1, 3).T
+    return width, thickness, speed, held / len(r)
+
+
+def line(f: Fragments) -> str:
+    """A specimen as a line of the table."""
+    means = (1e3 * f.width.mean(), 1e3 * f.thickness.mean(), f.speed.mean(), 100.0 * f.share)
+    numbers = "{:9.2f} {:9.2f} {:9.0f} {:9.0f}".format(*means)
+    return f"{f.seed:4} {1e6 * f.broken_at:8.1f} {f.expansion:8.2f} {len(f.width):8} {numbers}"
+
+
+def maps(directory: Path, what: str) -> list[Picture]:
+    """Fragments, or speeds of gas and wall, at the times SHOWN (after the paper's Figs. 25, 26)."""
+    pictures = []
+    frames = dict(series(directory, "particles"))
+    for time, path in series(directory, "cells"):
+        if min(abs(time - shown) for shown in SHOWN) < 1e-9:
+            _, cells, lower, spacing = read_cells(path)
+            values = _drawn(cells, read_particles(frames[time])[1], lower, spacing, what)
+            size = [1e3 * n * s for n, s in zip(values.shape[::-1], spacing[:2], strict=True)]
+            label = {"speed": "speed [m/s]", "piece": "fragments"}[what]
+            extent = (0.0, size[0], 0.0, size[1])
+            pictures.append(Picture(f"{label}, {1e6 * time:.0f} us", values, extent, "turbo", label=""))
+    return pictures
+
+
+def _drawn(cells, particles, lower, spacing, what) -> np.ndarray:
+    """Speeds of gas and wall, or the numbers of the fragments, in the cells."""
+    x = particles["position"][:, :2]
+    place = tuple(((x - np.array(lower[:2])) / np.array(spacing[:2])).astype(int).T[::-1])
+    speed = np.linalg.norm(cells["velocity"][0], axis=-1)
+    if what == "speed":
+        speed[place] = np.hypot(*particles["velocity"][:, :2].T)
+        return speed
+    numbers = np.full(speed.shape, np.nan)
+    numbers[place] = np.unique(particles["piece"], return_inverse=True)[1] * 7 % 20
+    return numbers
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Run the specimens; print them beside experiment and paper; leave table and pictures in DIRECTORY."""
+    directories = {seed: burst(communicator, seed, overrides) for seed in SEEDS}
+    if communicator.rank > 0:
+        return
+    found = [fragments(directory, seed) for seed, directory in directories.items()]
+    print("seed  broken [us]  r/r0  fragments  width [mm]  thickness  speed [m/s]  mass [%]")
+    print("\n".join(line(f) for f in found))
+    for source in TUBE_FRAGMENTS:
+        print(f"{source.source}: width {1e3 * source.width} mm, thickness {1e3 * source.thickness} mm, {source.speed}")
+    write(found)
+    first = directories[SEEDS[0]]
+    draw_pictures(DIRECTORY / "fragments.png", maps(first, "piece"), columns=4, unit="mm")
+    draw_pictures(DIRECTORY / "speed.png", maps(first, "speed"), columns=4, unit="mm")
+    draw_charts(DIRECTORY / "energy.png", [energies(first)], columns=1)
+    print(f"\nruns, table and pictures in {DIRECTORY}", flush=True)
+
+
+def energies(directory: Path) -> Chart:
+    """Energy of the quarter of the tube (after the paper's Fig. 27)."""
+    history = read_history(directory / "history.csv")
+    time, kinetic, internal = (
+        history[name] for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
+    )
+    curves = [
+        Curve(1e6 * time, 1e-6 * values, name)
+        for name, values in (("kinetic", kinetic), ("internal", internal), ("both", kinetic + internal))
+    ]
+    return Chart("quarter of the tube, one metre", "time [us]", "energy [MJ]", curves)
+
+
+def write(found: Sequence[Fragments]) -> None:
+    """All fragments as CSV."""
+    with (DIRECTORY / "fragments.csv").open("w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["seed", "broken at [s]", "r/r0", "width [m]", "thickness [m]", "speed [m/s]"])
+        for f in found:
+            for w, t, v in zip(f.width, f.thickness, f.speed, strict=True):
+                table.writerow([f.seed, f"{f.broken_at:.3g}", f"{f.expansion:.3f}", f"{w:.3e}", f"{t:.3e}", f"{v:.0f}"])
+
+
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """One specimen on few cells up to 12 us, only to see that it breaks."""
+    coarse = (
+        "domain.upper=[0.07,0.07]",
+        "domain.cells=[35,35]",
+        'solid.bodies.tube.spacing="1 mm"',
+        'time.end="12 us"',
+    )
+    found = fragments(burst(communicator, SEEDS[0], [*coarse, *overrides]), SEEDS[0])
+    print(line(found), flush=True)
