@@ -28,6 +28,7 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "kernels",
     "frontier solid",
     "stability solid",
+    "frontier coupling",
 )
 
 

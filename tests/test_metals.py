@@ -2,7 +2,7 @@
 
 import pytest
 
-from distfsi.study import frontier_solid, solids, stability_solid
+from distfsi.study import frontier, solids, stability_solid
 
 
 def missed(problem, spacing, *settings):
@@ -49,7 +49,7 @@ def test_the_cantilever_swings_with_timoshenkos_period():
 
 def test_the_frontier_keeps_what_nothing_beats():
     def outcome(variant, seconds, error):
-        return frontier_solid.Outcome(variant, 1.0, 1, 1, seconds, (solids.Figure("a", 1.0 + error, 1.0, 0.1),))
+        return frontier.Outcome(variant, 1.0, 1, 1, seconds, (solids.Figure("a", 1.0 + error, 1.0, 0.1),))
 
     found = [
         outcome("slow", 3.0, 0.1),
@@ -57,8 +57,8 @@ def test_the_frontier_keeps_what_nothing_beats():
         outcome("beaten", 2.0, 0.4),
         outcome("best", 4.0, 0.01),
     ]
-    found.append(frontier_solid.Outcome("failed", 1.0, 1, 1, float("nan"), (), "diverged"))
-    assert [o.variant for o in frontier_solid.front(found)] == ["fast", "slow", "best"]
+    found.append(frontier.Outcome("failed", 1.0, 1, 1, float("nan"), (), "diverged"))
+    assert [o.variant for o in frontier.front(found)] == ["fast", "slow", "best"]
 
 
 def test_stretched_plates_stay_whole_with_bonds_alone():
