@@ -13,7 +13,7 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
-from distfsi.physics import euler, five_equation, limiters, positivity, reconstruction, riemann, two_phase
+from distfsi.physics import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann, two_phase
 from distfsi.physics.eos import jwl, stiffened_gas
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
 
@@ -124,6 +124,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
+        "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
         "SHARPENED": phases == 2 and (fluid.sharpening or curved),
         "CURVED": curved,
@@ -132,6 +133,9 @@ def fluid_model(scene: Scene) -> FluidModel:
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
+    if constants["FINISHES"]:
+        bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
+        bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
     bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}

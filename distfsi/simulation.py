@@ -44,6 +44,7 @@ COUPLINGS = {"cut_cells": CutCells, "paper": Coupling}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 STEPS_BETWEEN_DEALS = 100
 
+FLUID_LIMIT = "fluid CFL"
 ATTEMPTS = 8  # at a step, each with half the time step of the one before
 
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
@@ -97,6 +98,7 @@ class Simulation:
 
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
+    signals   of this rank's blocks of fluid [1/s] before the last step
     asked     what this rank is asked for; looked at once in every step
     request   the strongest of what all ranks were asked for in the last step: the same on all of them
     """
@@ -112,6 +114,7 @@ class Simulation:
     steps: int = 0
     dt: float = 0.0
     limited_by: str = "start"
+    signals: np.ndarray | None = None
     asked: Callable[[], Request] = lambda: Request.NOTHING
     request: Request = Request.NOTHING
 
@@ -178,6 +181,7 @@ class Simulation:
     def time_step(self) -> float:
         """The longest stable step [s] of all parts on all ranks. Raises Diverged when a part has no valid state."""
         signal = self.fluid.fastest_signal() if self.fluid else 0.0
+        self.signals = self.fluid.signals.copy() if self.fluid else None
         solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
         wall_dt = self.coupling.time_step() if self.coupling else np.inf
         rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, 1.0 / wall_dt, self.asked()])
@@ -191,12 +195,22 @@ class Simulation:
             ]
             self.limited_by = holder[0]
         else:
-            self.limited_by = "fluid CFL" if fluid_rate >= wall_rate else "wall speed"
+            named = self.limited_by.startswith(FLUID_LIMIT)
+            limit = self.limited_by if named else FLUID_LIMIT
+            self.limited_by = limit if fluid_rate >= wall_rate else "wall speed"
         dt = 1.0 / max(fluid_rate, solid_rate, wall_rate)
         left = self.scene.time.end - self.time
         if dt >= left:
             self.limited_by = "end time"
         return min(dt, left)
+
+    def name_limit(self) -> str:
+        """Collective. What set the last time step; if the fluid did, where it was fastest and how fast. Progress tells
+        it until the next step that is limited otherwise, or asked for."""
+        if self.limited_by.startswith(FLUID_LIMIT):
+            cells = self.communicator.allgather(self.fluid.fastest_cell(self.signals))
+            self.limited_by = f"{FLUID_LIMIT}, {max(cells, key=lambda cell: (cell[0], *cell[1]))[2]}"
+        return self.limited_by
 
     def check(self) -> None:
         """Collective. Raise Diverged on all ranks when the next step cannot start from the present state."""

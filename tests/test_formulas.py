@@ -363,7 +363,7 @@ def test_a_uniform_state_stays_to_the_bit(fluid, dimensions):
         U = tuple(map(float, formula("conserved", fluid, dimensions)(W)))
         W = formula("primitives", fluid, dimensions)(U)
         for b in (1.0, 0.25, 2.0 / 3.0):
-            assert updated(U, U, W, nothing, b, 1e-6) == U
+            assert updated(U, U, W, nothing, b, 1e-6)[: len(U)] == U
 
     check()
 

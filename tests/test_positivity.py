@@ -109,6 +109,21 @@ def test_limited_flow_keeps_the_books_and_has_the_same_bits_on_any_cut():
     assert results[0][1:] == results[1][1:]
 
 
+@pytest.mark.parametrize("block", [(16, 16), (5, 4)])
+def test_the_cell_that_limits_the_time_step_is_named(block):
+    """One cell of hot gas, and the speed of sound there plus the flow's; as before the step."""
+    air, hot = (FluidState(0, 1.0, p, (10.0, 0.0)) for p in (1e5, 4e5))
+    regions = (Region(air, None), Region(hot, Box((0.5, 0.25), (0.5625, 0.3125))))
+    performance = Performance(block, block)
+    scene = scene_of((AIR,), regions, (0.0, 0.0), (1.0, 1.0), (16, 16), 1.0, performance=performance)
+    simulation = start(scene)
+    simulation.step()
+    assert simulation.limited_by == "fluid CFL"
+    assert simulation.name_limit() == simulation.limited_by == "fluid CFL, 758.3 m/s at (0.53125, 0.28125) m"
+    simulation.step()
+    assert simulation.limited_by.startswith("fluid CFL, 758.3 m/s")
+
+
 def test_a_failed_step_is_redone():
     """With half the time step, counted, and without a trace of the first attempt in the books."""
     simulation = torn_apart(100.0, 0.9, WALLS)

@@ -7,7 +7,8 @@ import pytest
 
 from distfsi.device import cpu
 from distfsi.device.markers import driver
-from distfsi.physics.relaxation import relaxed_fraction_change
+from distfsi.kernels.fluid import HALVINGS
+from distfsi.physics.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
 from fluids import MATERIALS, PAIRS, TRACE, model_of
@@ -19,13 +20,13 @@ WITH_JWL = [pair for pair in PAIRS if "tnt" in pair]
 
 
 @driver
-def relax_all(a1, pressures, densities, p_n, change):
-    """Relaxation alone, of phases whose pressures differ from p_n."""
+def relax_all(a1, pressures, densities, p_n, finishes, change):
+    """Relaxation alone, of phases whose pressures differ from p_n; to the end where a stage would go there."""
     for i in range(a1.size):
         a2 = 1.0 - a1[i]
         G1, slope1 = reference_1(densities[i, 0])
         G2, slope2 = reference_2(densities[i, 1])
-        change[i] = relaxed_fraction_change(
+        phases = phases_before(
             p_n[i],
             a1[i],
             0.0,
@@ -36,6 +37,12 @@ def relax_all(a1, pressures, densities, p_n, change):
             a1[i] * (pressures[i, 0] - p_n[i]),
             a2 * (pressures[i, 1] - p_n[i]),
         )
+        change[i], settled = relaxed_fraction_change(phases)
+        if finishes and settled < 0.0:
+            low, high = range_of_change(a1[i])
+            for _ in range(HALVINGS):
+                low, high = halved_range(phases, low, high)
+            change[i] = 0.5 * (low + high)
 
 
 @driver
@@ -118,13 +125,13 @@ def exact_change(first, second):
     return 0.5 * (low + high)
 
 
-def relaxed(pair, decades):
+def relaxed(pair, decades, finishes=False):
     """(computed change, exact change, both paths) of the random states that can relax within the bounds of a1."""
     a1, pressures, densities = draw(pair, decades)
     first = Path(pair[0], a1, pressures[:, 0], densities[:, 0])
     second = Path(pair[1], 1.0 - a1, pressures[:, 1], densities[:, 1])
     change = np.empty_like(a1)
-    kernels(pair).relax_all(a1, pressures, densities, pressures.min(axis=1), change)
+    kernels(pair).relax_all(a1, pressures, densities, pressures.min(axis=1), finishes, change)
     exact = exact_change(first, second)
     assert np.all((a1 + change > 0.0) & (a1 + change < 1.0))
     free = (a1 + exact > 1.01 * TRACE) & (a1 + exact < 1.0 - 1.01 * TRACE)
@@ -161,6 +168,15 @@ def test_refits_bring_jwl_to_one_pressure(pair, decades, worst, usual):
     assert np.quantile(differences, 0.98) < usual
 
 
+@pytest.mark.parametrize("decades", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("pair", WITH_JWL, ids="-".join)
+def test_jwl_is_brought_to_the_root_from_any_imbalance(pair, decades):
+    """1e-10 of the smaller volume fraction, or the last bit of the larger one."""
+    change, exact, first, second = relaxed(pair, decades, finishes=True)
+    smaller = np.minimum(np.minimum(first.a, second.a), np.minimum(first.a + exact, second.a - exact))
+    assert np.all(abs(change - exact) <= 1e-10 * smaller + np.finfo(float).eps)
+
+
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 def test_relaxation_moves_towards_the_exact_state_from_any_imbalance(pair):
     """Even a factor of a million leaves no pressure difference larger than before and no fraction out of bounds."""
@@ -177,8 +193,8 @@ def test_the_order_of_the_phases_does_not_matter(pair):
     a1, pressures, densities = draw(pair, 1.0)
     there, back = np.empty_like(a1), np.empty_like(a1)
     p_n = pressures.min(axis=1)
-    kernels(pair).relax_all(a1, pressures, densities, p_n, there)
-    kernels(pair[::-1]).relax_all(1.0 - a1, pressures[:, ::-1].copy(), densities[:, ::-1].copy(), p_n, back)
+    kernels(pair).relax_all(a1, pressures, densities, p_n, False, there)
+    kernels(pair[::-1]).relax_all(1.0 - a1, pressures[:, ::-1].copy(), densities[:, ::-1].copy(), p_n, False, back)
     assert np.all(abs(there + back) <= 1e-9 * np.minimum(a1 + there, 1.0 - a1 - there))
 
 
@@ -190,7 +206,7 @@ def test_a_falling_pressure_is_held_before_it_vanishes(pair):
     pressures[::2, 0] = -10.0 * p_n[::2] - 1e10
     pressures[1::2, 1] = -10.0 * p_n[1::2] - 1e10
     change = np.empty_like(a1)
-    kernels(pair).relax_all(a1, pressures, densities, p_n, change)
+    kernels(pair).relax_all(a1, pressures, densities, p_n, True, change)
     assert np.all((a1 + change > 0.0) & (a1 + change < 1.0))
 
 

@@ -113,8 +113,8 @@ def text_by_hand(
 def formulas_text(
     names: Sequence[str], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
 ) -> str:
-    """The CUDA C of the formulas that a scene binds to `names`, for a hand-written kernel that calls them so."""
-    emission = Emission(constants, bindings)
+    """The CUDA C of those of `names` to which a scene binds a formula, for a hand-written kernel that calls them so."""
+    emission, names = Emission(constants, bindings), [name for name in names if name in bindings]
     emitted = {name: emission.add(bindings[name].function, bindings[name].constants, "__" + name) for name in names}
     parts = [Writer(s, real).function(t) for s, t in callees_first(emission.functions, emitted.values())]
     parts += [

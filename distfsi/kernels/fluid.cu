@@ -1,6 +1,6 @@
 // The loops of kernels/fluid.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, FINISHES, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
 // ---- tuples and arrays ------------------------------------------------------------------------------------------------
@@ -48,6 +48,7 @@ constexpr int ROW = TILE_X + 1;  // of faces
 constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
 constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
 constexpr real LEAST_VOLUME = HALF;
+constexpr int HALVINGS = 80;
 static_assert(SHARED == VARIABLES * SP + FLUXES * FACES && THREADS == TILE_X * TILE_Y, "what the launch assumes");
 
 // P of a cell of the tile; k counts planes, of which the last SLOTS are there.
@@ -155,6 +156,27 @@ DEVICE void book(double *through, const real *F, int axis, int step, int n, int 
     }
 }
 
+// U_new = one Runge-Kutta stage of a cell, relaxed to the end. (A template: not every scene has all these formulas.)
+template <class... T> DEVICE void advance(Tuple<T...> before, Tuple<T...> now, Tuple<T...> W, auto D, real b, real dt,
+                                          real *U_new, long long su)
+{
+    const auto state = updated(before, now, W, D, b, dt);
+    if constexpr (!FINISHES) {
+        put(state, U_new, su);
+    } else {
+        real values[VARIABLES + 1];
+        put(state, values, 1);
+#pragma unroll
+        for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
+        if (values[VARIABLES] >= 0) return;
+        const auto start = before_relaxation(before, now, W, D, b, dt);
+        auto range = range_of_change(item<1>(item<0>(start)));
+#pragma unroll 1
+        for (int n = 0; n < HALVINGS; n++) range = halved_range(item<0>(start), item<0>(range), item<1>(range));
+        U_new[(VARIABLES - 1) * su] = fraction_after(before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+    }
+}
+
 // columns of the tile table
 enum { BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES };
 
@@ -258,7 +280,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
             const auto divergence = tuple_of<FLUXES>(D);
-            put(updated(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt), U_new + u, su);
+            advance(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
         }
         __syncthreads();
     }

@@ -19,6 +19,7 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     CURVED,
     DIMENSIONS,
+    FINISHES,
     FLUXES,
     FRACTIONAL,
     GHOSTS,
@@ -26,10 +27,14 @@ from distfsi.physics.symbols import (
     PHASES,
     SHARPENED,
     VARIABLES,
+    before_relaxation,
     face_flux,
+    fraction_after,
+    halved_range,
     is_admissible,
     limited_flux,
     primitives,
+    range_of_change,
     reconstructed,
     reserve,
     sharpened,
@@ -41,6 +46,7 @@ from distfsi.physics.symbols import (
 # touches (bits)
 BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES = 0, 1, 2, 3, 4, 5, 6, 7
 
+HALVINGS = 80  # of the range of a volume fraction, down to the last bit also where one is a trace
 LEAST_VOLUME = 0.5  # of a cell: what has less is not the stage's to advance (kernels/band.py)
 
 
@@ -187,28 +193,63 @@ def divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz):
     return total
 
 
+@helper
+def change_by_fluxes(F, V, i, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz):
+    """dt times the flux divergence of all variables in cell i of a row, per volume of its fluid."""
+    D = tuple(divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz) for v in static_range(FLUXES))
+    if FRACTIONAL:
+        concentration = 1.0 / max(load(V, s + i), LEAST_VOLUME)
+        return tuple(D[v] * concentration for v in static_range(FLUXES))
+    return D
+
+
 @row
 def update_row(
-    U_n, U, P, F, V, U_new, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz, b, dt, n
+    U_n, U, P, F, V, U_new, T, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz, b, dt, n
 ):  # fmt: skip
-    """U_new = one Runge-Kutta stage of the n cells at U[u …]; V[s …]: their volumes of fluid if it is FRACTIONAL."""
+    """U_new = one Runge-Kutta stage of the n cells at U[u …]; V[s …]: their volumes of fluid if it is FRACTIONAL.
+
+    Returns how many cells have not relaxed; T[0 …] is negative for those.
+    """
+    count = 0
     for i in range(n):
-        D = tuple(
-            divergence(F, v, i, st, fx, fy_low, fy_high, fz_low, fz_high, cx, cy, cz) for v in static_range(FLUXES)
-        )
-        if FRACTIONAL:
-            concentration = 1.0 / max(load(V, s + i), LEAST_VOLUME)
-            D = tuple(D[v] * concentration for v in static_range(FLUXES))
         new = updated(
             tuple(load(U_n, u + v * su + i) for v in static_range(VARIABLES)),
             tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)),
             tuple(load(P, p + v * sp + i) for v in static_range(VARIABLES)),
-            D,
+            change_by_fluxes(F, V, i, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz),
             b,
             dt,
         )
         for v in static_range(VARIABLES):
             store(U_new, u + v * su + i, new[v])
+        if FINISHES:
+            store(T, i, new[VARIABLES])
+            count += 1 if new[VARIABLES] < 0.0 else 0
+    return count
+
+
+@row
+def finish_cells(
+    U_n, U, P, F, V, U_new, T, u, su, p, sp, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz, b, dt, n
+):  # fmt: skip
+    """Relax those cells to the end that `update_row` has not."""
+    i = next_without_reserve(T, 0, 0, n)
+    while i < n:
+        before = tuple(load(U_n, u + v * su + i) for v in static_range(VARIABLES))
+        phases, moved = before_relaxation(
+            before,
+            tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)),
+            tuple(load(P, p + v * sp + i) for v in static_range(VARIABLES)),
+            change_by_fluxes(F, V, i, st, fx, fy_low, fy_high, fz_low, fz_high, s, cx, cy, cz),
+            b,
+            dt,
+        )
+        low, high = range_of_change(phases[1])
+        for _ in range(HALVINGS):
+            low, high = halved_range(phases, low, high)
+        store(U_new, u + (VARIABLES - 1) * su + i, fraction_after(before, moved + 0.5 * (low + high)))
+        i = next_without_reserve(T, 0, i + 1, n)
 
 
 @row
@@ -265,7 +306,7 @@ def book(through, t, side, F, f, step, st, axis, n, rows, weight):
 
 STAGE_FORMULAS = (
     "primitives", "reconstructed", "sharpened", "face_flux", "sound_speed", "reserve", "is_admissible", "limited_flux",
-    "updated",
+    "updated", "before_relaxation", "range_of_change", "halved_range", "fraction_after",
 )  # fmt: skip
 
 
@@ -362,10 +403,16 @@ def advance_tiles(
                     count += face_fluxes(P, T, F, c, sp, px * py, 1, px, tz, tz_next, px, fz, 2, rz, n, own)
                 u = u0 + k * sz + j * sy
                 fz_low, fz_high = (now + j) * fluxes, (then + j) * fluxes
-                update_row(
-                    U_n, U, P, F, volumes, U_new, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high,
-                    v0 + k * sz + j * sy, cx, cy, cz, b, dt, n,
+                s = v0 + k * sz + j * sy
+                unsettled = update_row(
+                    U_n, U, P, F, volumes, U_new, T, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high, s, cx, cy, cz,
+                    b, dt, n,
                 )  # fmt: skip
+                if FINISHES and unsettled > 0:
+                    finish_cells(
+                        U_n, U, P, F, volumes, U_new, T, u, su, c, sp, px, fx, fy, fy_next, fz_low, fz_high, s, cx, cy,
+                        cz, b, dt, n,
+                    )  # fmt: skip
                 if sides & 1:
                     book(through, t, 0, F, fx, step, px, 0, 1, x_alike, weight * cx)
                 if sides & 2:

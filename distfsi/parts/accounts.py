@@ -50,7 +50,7 @@ class Accounts:
             "step": simulation.steps,
             "time [s]": simulation.time,
             "time step [s]": simulation.dt,
-            "limited by": simulation.limited_by,
+            "limited by": simulation.name_limit(),
         }
         balance, size = np.zeros(len(self.conserved)), np.zeros(len(self.conserved))
 

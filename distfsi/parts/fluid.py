@@ -217,6 +217,33 @@ class Fluid:
         )  # fmt: skip
         return float(np.max(self._fastest.here()))
 
+    @property
+    def signals(self) -> np.ndarray:
+        """(local blocks,) the last fastest signal [1/s] of each block."""
+        return self._fastest.here()
+
+    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple, str]:
+        """The fastest of `signals`, those of this rank's blocks before the last step, where its block begins in the
+        grid, and its cell in words. Of equal ones that whose block comes last along z, y, x."""
+        if not self.blocks.local_count:
+            return 0.0, (), ""
+        block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
+        with np.errstate(all="ignore"):
+            W = self.model.formula("primitives")(self.active(self.previous, block).astype(np.float64))
+            c = self.model.formula("sound_speed")(W)
+        axes = range(self.model.dimensions)
+        speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
+        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
+        cell = np.unravel_index(np.nanargmax(signal), signal.shape)
+        place = self._place(block, cell)
+        text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({place}) m"
+        return float(signals[block]), tuple(self.blocks.origin[block, ::-1].tolist()), text
+
+    def _place(self, block: int, cell: tuple) -> str:
+        """The center of the cell (z, y, x) of a local block, in words."""
+        centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
+        return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
+
     def _first_active(self) -> int:
         gx, gy, gz = self.blocks.grid.ghosts
         _, size_y, size_x = self.blocks.shape
@@ -330,9 +357,7 @@ class Fluid:
                 valid |= self.active(covered, block)
             if not valid.all():
                 z, y, x = np.argwhere(~valid)[0]
-                centers = zip(self.blocks.cell_centers(block), (x, y, z), strict=True)
-                place = ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
-                where = f"at t = {time:.6g} s in the cell at ({place}) m"
+                where = f"at t = {time:.6g} s in the cell at ({self._place(block, (z, y, x))}) m"
                 values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
                 state = ", ".join(f"{name} {value:.6g}" for name, value in values)
                 raise Diverged(f"the fluid has no valid state {where}: {state}")

@@ -7,7 +7,7 @@ content until they are relaxed.
 
 from math import pow, sqrt
 
-from distfsi.physics.relaxation import relaxed_fraction_change
+from distfsi.physics.relaxation import phases_before, relaxed_fraction_change
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
     DIMENSIONS,
@@ -115,7 +115,7 @@ def state_of(Q, volume):
         ref2, slope2 = reference_2(W[1])
         excess1 = OMEGA_1 * (Q[VARIABLES] / volume) - a1 * (p - ref1)
         excess2 = OMEGA_2 * (Q[VARIABLES + 1] / volume) - a2 * (p - ref2)
-        change = relaxed_fraction_change(p, a1, 0.0, U[0], U[1], ref1, ref2, excess1, excess2)
+        change, settled = relaxed_fraction_change(phases_before(p, a1, 0.0, U[0], U[1], ref1, ref2, excess1, excess2))
         relaxed = min(max(a1 + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
         return (*(U[v] for v in static_range(VARIABLES - 1)), relaxed)
 

@@ -8,8 +8,9 @@ pressure):
 
 With constant G (ideal and stiffened gas) it is the hyperbola a = a0 + k (p0 - p)/(p + P), k = a0/(1 + omega), and the
 common pressure is the root of a quadratic. Otherwise the hyperbola of the stiffened gas with the same bulk modulus,
-rho c^2 = (1 + omega)(p + P), is fitted where both phases stand and solved again, a fixed number of times. Pressures are
-relative to the pressure before the step, so that nothing moves, to the bit, when nothing changed.
+rho c^2 = (1 + omega)(p + P), is fitted where both phases stand and solved again, a fixed number of times. The last
+fit's step tells where that was not enough; there the range of volume fractions is halved until it is a point. Pressures
+are relative to the pressure before the step, so that nothing moves, to the bit, when nothing changed.
 """
 
 from math import sqrt
@@ -18,6 +19,7 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import CLOSED_FORM, MINIMUM_FRACTION, OMEGA_1, OMEGA_2, reference_1, reference_2
 
 REFITS = 3  # with JWL both pressures agree to 1e-6 after imbalances up to a factor 2, to 1e-2 after a factor 10
+SETTLED = 1e-6  # of the smaller volume fraction: the last fit's step, whose error is about its square
 DEEPEST = -0.9  # a phase pressure may fall by this part of p + P in one stage; the total energy is not touched
 NEAREST = 1.000001  # to the volume at which a phase's pressure has no bound
 
@@ -40,41 +42,69 @@ def change_on_path(t, p0, G0, reference, OMEGA):
     return ((reference - G0) * (1.0 + t) - ((p0 - G0) + OMEGA * p0) * t) / (1.0 + (1.0 + OMEGA) * t)
 
 
-def relaxed_fraction_change(p_n, a1, da, m1, m2, G1_n, G2_n, we1, we2):
-    """Change of a1 by relaxation, after transport changed a1 by `da`, and omega_k times the phase energies by we1, we2.
+def phases_before(p_n, a1, da, m1, m2, G1_n, G2_n, we1, we2):
+    """Where both phases stand: p_n, a1, then of each its density, reference pressure, p - p_n, and p - p_n + P of the
+    stiffened gas with the same bulk modulus.
 
-    Both phases had the pressure p_n and the reference pressures G_n before.
+    Transport changed a1 by `da`, and omega_k times the phase energies by we1, we2; before, both phases had the pressure
+    p_n and the reference pressures G_n.
     """
     a2 = 1.0 - a1
-    share1, share2 = 1.0 / (1.0 + OMEGA_1), 1.0 / (1.0 + OMEGA_2)
     rho1, rho2 = m1 / a1, m2 / a2
     G1, slope1 = reference_1(rho1)
     G2, slope2 = reference_2(rho2)
-    c1 = p_n + (rho1 * slope1 - G1) * share1
-    c2 = p_n + (rho2 * slope2 - G2) * share2
+    c1 = p_n + (rho1 * slope1 - G1) * (1.0 / (1.0 + OMEGA_1))
+    c2 = p_n + (rho2 * slope2 - G2) * (1.0 / (1.0 + OMEGA_2))
     q1 = max((we1 - da * (p_n - G1_n)) / a1 + (G1 - G1_n), DEEPEST * c1)
     q2 = max((we2 + da * (p_n - G2_n)) / a2 + (G2 - G2_n), DEEPEST * c2)
-    k1, k2 = a1 * share1, a2 * share2
+    return (p_n, a1, rho1, G1, q1, c1, rho2, G2, q2, c2)
+
+
+def range_of_change(a1):
+    """Least and largest change of a1 at which both phases have a volume and a finite pressure."""
+    a2 = 1.0 - a1
+    k1, k2 = a1 * (1.0 / (1.0 + OMEGA_1)), a2 * (1.0 / (1.0 + OMEGA_2))
+    lowest = max(MINIMUM_FRACTION, NEAREST * (a1 - k1)) - a1
+    return (lowest, a2 - max(MINIMUM_FRACTION, NEAREST * (a2 - k2)))
+
+
+def phases_after(phases, change):
+    """p - p_n and p - p_n + P of both phases when a1 has changed."""
+    p_n, a1, rho1, G1, q1, c1, rho2, G2, q2, c2 = phases
+    t1, t2 = change / a1, -change / (1.0 - a1)
+    now1, now2 = rho1 / (1.0 + t1), rho2 / (1.0 + t2)
+    ref1, slope1 = reference_1(now1)
+    ref2, slope2 = reference_2(now2)
+    return (
+        q1 + change_on_path(t1, p_n + q1, G1, ref1, OMEGA_1),
+        p_n + (now1 * slope1 - ref1) * (1.0 / (1.0 + OMEGA_1)),
+        q2 + change_on_path(t2, p_n + q2, G2, ref2, OMEGA_2),
+        p_n + (now2 * slope2 - ref2) * (1.0 / (1.0 + OMEGA_2)),
+    )
+
+
+def relaxed_fraction_change(phases):
+    """Change of a1 by relaxation, and how much SETTLED exceeds its last step: negative where it has not relaxed."""
+    p_n, a1, rho1, G1, q1, c1, rho2, G2, q2, c2 = phases
+    a2 = 1.0 - a1
+    k1, k2 = a1 * (1.0 / (1.0 + OMEGA_1)), a2 * (1.0 / (1.0 + OMEGA_2))
     change = fraction_change_of_fit(k1, q1, c1, k2, q2, c2)
     if CLOSED_FORM:
-        return change
+        return (change, 0.0)
     else:
-        p1, p2 = p_n + q1, p_n + q2
-        lowest = max(MINIMUM_FRACTION, NEAREST * (a1 - k1)) - a1
-        highest = a2 - max(MINIMUM_FRACTION, NEAREST * (a2 - k2))
+        lowest, highest = range_of_change(a1)
         change = min(max(change, lowest), highest)
+        further = 0.0 * change
         for _ in static_range(REFITS):
-            t1, t2 = change / a1, -change / a2
-            now1, now2 = rho1 / (1.0 + t1), rho2 / (1.0 + t2)
-            ref1, gradient1 = reference_1(now1)
-            ref2, gradient2 = reference_2(now2)
-            further = fraction_change_of_fit(
-                k1 + change,
-                q1 + change_on_path(t1, p1, G1, ref1, OMEGA_1),
-                p_n + (now1 * gradient1 - ref1) * share1,
-                k2 - change,
-                q2 + change_on_path(t2, p2, G2, ref2, OMEGA_2),
-                p_n + (now2 * gradient2 - ref2) * share2,
-            )
+            now1, stiff1, now2, stiff2 = phases_after(phases, change)
+            further = fraction_change_of_fit(k1 + change, now1, stiff1, k2 - change, now2, stiff2)
             change = min(max(change + further, lowest), highest)
-        return change
+        return (change, SETTLED * min(a1 + change, a2 - change) - abs(further))
+
+
+def halved_range(phases, low, high):
+    """The half of the range low … high in which the change of a1 is that gives both phases one pressure."""
+    middle = 0.5 * (low + high)
+    now1, stiff1, now2, stiff2 = phases_after(phases, middle)
+    rises = now1 > now2
+    return (middle if rises else low, high if rises else middle)

@@ -38,6 +38,7 @@ OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
 CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
+FINISHES = Symbol("whether relaxation may need more than its fixed number of steps")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
 CURVED = Symbol("whether primitives rise by different amounts on the two sides of a cell's mean")
@@ -65,6 +66,10 @@ reserve = chosen("reserve", "cell means, flux, sound speed, rate -> negative whe
 is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the flux alone leaves both cells valid")
 limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
+before_relaxation = chosen("before_relaxation", "as updated -> where both phases stand, transport's change of a1")
+range_of_change = chosen("range_of_change", "volume fraction -> least and largest change by relaxation")
+halved_range = chosen("halved_range", "where both phases stand, range of changes -> the half with one pressure")
+fraction_after = chosen("fraction_after", "state before the step, change in the stage -> volume fraction")
 bulk_modulus = chosen("bulk_modulus", "primitive state -> rho c^2 [Pa], positive where the state is admissible")
 sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
 

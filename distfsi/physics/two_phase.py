@@ -7,10 +7,11 @@ paper, Eqs. 9-30). At faces the velocity components are rotated so that the norm
 
 from math import sqrt
 
-from distfsi.physics.relaxation import relaxed_fraction_change
+from distfsi.physics.relaxation import phases_before, relaxed_fraction_change
 from distfsi.physics.riemann import contact_speed
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import (
+    CLOSED_FORM,
     DIMENSIONS,
     FLUXES,
     GRAVITY,
@@ -183,19 +184,18 @@ def updated_conserved(U_n, U, D, b, dt):
     )
 
 
-def updated(U_n, U, W, D, b, dt):
-    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure.
+def before_relaxation(U_n, U, W, D, b, dt):
+    """Where both phases stand after a stage (relaxation.py), and by how much transport has changed a1.
 
-    D is dt times the divergence of the fluxes. Everything is written as a change of U_n, so that a uniform state stays
-    as it is to the bit. Phase energies obey the paper's Eq. 15 (sign corrected); rho E is the conserved energy, from
-    which they are reset (Eq. 30).
+    Phase energies obey the paper's Eq. 15 (sign corrected); rho E is the conserved energy, from which they are reset
+    (Eq. 30).
     """
     W_n = primitives(U_n)
     p_n, a1_n = W_n[2 + DIMENSIONS], U_n[3 + DIMENSIONS]
     p, a1 = W[2 + DIMENSIONS], W[3 + DIMENSIONS]
     a2_n, a2, du = 1.0 - a1_n, 1.0 - a1, D[VARIABLES + 2]
 
-    new = updated_conserved(U_n, U, D, b, dt)
+    m1, m2 = tuple(U_n[k] + b * (U[k] - D[k] - U_n[k]) for k in static_range(2))
     da = b * (a1 - D[3 + DIMENSIONS] + a1 * du - a1_n)
     da = min(max(da, MINIMUM_FRACTION - a1_n), (1.0 - MINIMUM_FRACTION) - a1_n)
     reference1_n, slope1_n = reference_1(W_n[0])
@@ -206,8 +206,27 @@ def updated(U_n, U, W, D, b, dt):
     e2_n, e2 = a2_n * ((p_n - reference2_n) / OMEGA_2), a2 * ((p - reference2) / OMEGA_2)
     de1 = b * (e1 - D[VARIABLES] + a1 * p * -du - e1_n)
     de2 = b * (e2 - D[VARIABLES + 1] + a2 * p * -du - e2_n)
-    relaxed = relaxed_fraction_change(
-        p_n, a1_n + da, da, new[0], new[1], reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2
-    )
-    a1_new = min(max(a1_n + (da + relaxed), MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-    return (*(new[v] for v in static_range(3 + DIMENSIONS)), a1_new)
+    phases = phases_before(p_n, a1_n + da, da, m1, m2, reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2)
+    return (phases, da)
+
+
+def fraction_after(U_n, change):
+    """a1 after its change in a stage."""
+    return min(max(U_n[3 + DIMENSIONS] + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
+
+
+def updated(U_n, U, W, D, b, dt):
+    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure; with JWL a
+    value behind the state that is negative where they do not yet.
+
+    D is dt times the divergence of the fluxes. Everything is written as a change of U_n, so that a uniform state stays
+    as it is to the bit.
+    """
+    phases, da = before_relaxation(U_n, U, W, D, b, dt)
+    relaxed, settled = relaxed_fraction_change(phases)
+    new = updated_conserved(U_n, U, D, b, dt)
+    state = (*(new[v] for v in static_range(3 + DIMENSIONS)), fraction_after(U_n, da + relaxed))
+    if CLOSED_FORM:
+        return state
+    else:
+        return (*(state[v] for v in static_range(VARIABLES)), settled)

@@ -32,6 +32,11 @@ COMBINATIONS: tuple[tuple[Method, float], ...] = (  # and the cells along x over
     ({"fluid.reconstruction": "van_leer", "fluid.precision": "float32"}, 1.0),
     ({"fluid.reconstruction": "van_leer", "time.scheme": "rk2", "fluid.precision": "float32"}, 1.0),
     ({"fluid.reconstruction": "van_leer", "time.scheme": "rk2", "fluid.precision": "float32"}, 2.0),
+    ({"fluid.reconstruction": "van_leer", "fluid.sharpening": "true"}, 1.0),
+    ({"fluid.reconstruction": "van_leer", "fluid.sharpening": "true", "time.scheme": "rk2"}, 1.0),
+    ({"fluid.reconstruction": "van_leer", "fluid.sharpening": "true", "time.scheme": "rk2"}, 2.0),
+    ({"fluid.reconstruction": "weno5", "fluid.sharpening": "true"}, 1.0),
+    ({"fluid.reconstruction": "weno5", "fluid.sharpening": "true"}, 2.0),
     ({"fluid.reconstruction": "first_order", "fluid.riemann": "rusanov", "time.scheme": "rk2"}, 2.0),
 )
 
