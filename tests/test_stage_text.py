@@ -23,10 +23,11 @@ PERFORMANCE = {
 CELLS = {1: (100,), 2: (50, 21), 3: (28, 21, 22)}
 
 
-def blast(names, dimensions, **method):
+def blast(names, dimensions, pressures=(6e9, 2e9), **method):
     """Balls of high pressure in two corners of a box with walls at the low sides; the middle is at rest."""
     D, upper = dimensions, tuple(0.02 * n for n in CELLS[dimensions])
-    inner, outer = (FluidState(k, 1000.0, p, (0.0,) * D) for k, p in ((len(names) - 1, 6e9), (0, 2e9)))
+    phases = zip((len(names) - 1, 0), pressures, strict=True)
+    inner, outer = (FluidState(k, 1000.0, p, (0.0,) * D) for k, p in phases)
     return scene_of(
         tuple(MATERIALS[name] for name in names),
         (Region(outer, None), *(Region(inner, Ball(center, 0.09)) for center in ((0.05,) * D, upper))),
@@ -43,7 +44,7 @@ def blast(names, dimensions, **method):
 CASES = {
     "1D gas": (("air",), 1, {}),
     "1D gas, float32": (("air",), 1, {"precision": "float32"}),
-    "1D explosive and gas": (("tnt", "air"), 1, {"reconstruction": "van_leer", "riemann": "hll"}),
+    "1D gas and explosive, far from one pressure": (("air", "tnt"), 1, {"pressures": (6e9, 1e6), "riemann": "hll"}),
     "2D gas": (("air",), 2, {"riemann": "adaptive", "reconstruction": "weno5"}),
     "2D gas, float32, first order": (("air",), 2, {"precision": "float32", "reconstruction": "first_order"}),
     "2D water and gas": (("water", "air"), 2, {"riemann": "adaptive", "sharpening": True}),

@@ -94,7 +94,6 @@ def relaxed_fraction_change(phases):
     else:
         lowest, highest = range_of_change(a1)
         change = min(max(change, lowest), highest)
-        further = 0.0 * change
         for _ in static_range(REFITS):
             now1, stiff1, now2, stiff2 = phases_after(phases, change)
             further = fraction_change_of_fit(k1 + change, now1, stiff1, k2 - change, now2, stiff2)
