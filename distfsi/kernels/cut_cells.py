@@ -6,7 +6,7 @@ phase energies. Cells are named as in kernels/coupling.py.
 """
 
 from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.kernels.coupling import BOX, FLUID, add_flux, flux_of_face, look_at_face
+from distfsi.kernels.coupling import BOX, FLUID, flux_of_face, look_at_face
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening, step_to
 from distfsi.kernels.fluid import place
 from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
@@ -189,20 +189,15 @@ def open_between(kind, old, new, at, axis, step, cells):
 
 
 @helper
-def flux_beside_wall(U, kind, old, new, at, cells, steps, rates, axis, P, T, F):
-    """F = flux through the face between a cell and the next along `axis`; returns the open part of the face.
-
-    The slope of a cell is 0 where a neighbour along the axis is covered or behind a closed face.
-    """
-    step = steps[axis]
-    look_at_face(U, at, cells, steps, axis, P, T)
+def see_wall(kind, old, new, at, cells, step, axis, T):
+    """Set rises T around the face between a cell and the next along `axis` to 0 where one of the cells that make them
+    is covered or behind a closed face; returns the open part of the face."""
     between = open_between(kind, old, new, at + step, axis, step, cells)
     for c in range(2):
         beyond = open_between(kind, old, new, at + 2 * c * step, axis, step, cells)
         if not (between > 0.0 and beyond > 0.0):
             for v in range(VARIABLES):
                 T[2 * v + c] = 0.0
-    flux_of_face(P, T, F, rates, axis)
     return between
 
 
@@ -240,7 +235,9 @@ def advance_band(
             for side in range(2):
                 here = at + (side - 1) * step
                 if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
-                    between = flux_beside_wall(U, kind, old, new, here, cells, steps, rates, axis, P, T, F)
+                    look_at_face(U, here, cells, steps, axis, P, T)
+                    between = see_wall(kind, old, new, here, cells, step, axis, T)
+                    flux_of_face(P, T, F, rates, axis)
                     rate = (2 * side - 1) * rates[axis] * between
                     for v in range(FLUXES):
                         D[v] += rate * load(F, 2 * place(v, axis))
@@ -282,11 +279,14 @@ def book_sides(
         step = steps[axis]
         before = side_cells[n] if high == 1 else side_cells[n] - step
         weight = (2 * high - 1) * weights[axis]
-        add_flux(passed, n, U, before, cells, steps, rates, axis, weight, P, T, F)
-        if open_between(kind, old, new, before + step, axis, step, cells) > 0.0:
-            between = flux_beside_wall(U, kind, old, new, before, cells, steps, rates, axis, P, T, F)
-            for v in range(PHASES + DIMENSIONS + 1):
-                passed[n, v] -= weight * between * load(F, 2 * place(v, axis))
+        for seen in range(2):  # first as the stage does, which sees no wall
+            look_at_face(U, before, cells, steps, axis, P, T)
+            if seen == 1:
+                weight = -weight * see_wall(kind, old, new, before, cells, step, axis, T)
+            if weight != 0.0:
+                flux_of_face(P, T, F, rates, axis)
+                for v in range(PHASES + DIMENSIONS + 1):
+                    passed[n, v] += weight * load(F, 2 * place(v, axis))
 
 
 # ---- volumes --------------------------------------------------------------------------------------------------------
