@@ -29,6 +29,7 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "frontier solid",
     "stability solid",
     "frontier coupling",
+    "stability coupling",
 )
 
 

@@ -29,7 +29,7 @@ class Problem:
     settings: tuple[str, ...] = ()
     dimensions: int = 1
 
-    def start(self, spacing: float, per_cell: int, settings: Sequence[str] = ()) -> Simulation:
+    def start(self, spacing: float, per_cell: float, settings: Sequence[str] = ()) -> Simulation:
         """The run with cells of this size and so many particles to each, before its first step. Raises InputError."""
         cells = [round(self.width / spacing)] * self.dimensions
         sizes = [f"solid.bodies.{body}.spacing={spacing / per_cell!r}" for body in self.bodies]

@@ -11,8 +11,8 @@ from distfsi.study.couplings import FREE_PLATE, PISTON, PROBLEMS, Problem
 from distfsi.study.frontier import Frontier
 
 DIRECTORY = Path("out/study_frontier_coupling")
-SCHEMES, PER_CELL = {"cut cells": "cut_cells", "paper": "paper"}, (1, 2, 4)
-VARIANTS = {f"{name}, {n} per cell": (scheme, n) for name, scheme in SCHEMES.items() for n in PER_CELL}
+SCHEMES, PER_CELL = {"cut cells": "cut_cells", "paper": "paper"}, (1.4, 2.0, 4.0)
+VARIANTS = {f"{name}, {n:g} per cell": (scheme, n) for name, scheme in SCHEMES.items() for n in PER_CELL}
 
 
 def start(problem: Problem, variant: str, spacing: float, overrides: Sequence[str]) -> Simulation:

@@ -6,20 +6,16 @@ piece: no particle may have lost touch with the others.
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from threadpoolctl import threadpool_limits
 
-from distfsi.errors import Diverged, InputError
+from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator
-from distfsi.output.verdicts import VerdictMap, draw_verdicts
 from distfsi.scene.description import (
     Body,
     Box,
@@ -34,6 +30,7 @@ from distfsi.scene.description import (
 )
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
+from distfsi.study.stability import Map, Stability, corners
 
 DIRECTORY = Path("out/study_stability_solid")
 COPPER = MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 2.0, 0.47)
@@ -50,19 +47,6 @@ VERDICTS = {
 APART = 1.6  # of the spacing, stretched as the body is: farther from all others means broken off
 MOST_STEPS = 20000
 FACTORS = (0.1, 0.2, 0.33, 0.5, 0.67, 0.83, 1.0)  # of the stable step, over 0.3
-
-
-@dataclass(frozen=True)
-class Map:
-    """Runs over a hardness (rows) by particles through the thickness or the time step (columns)."""
-
-    name: str
-    title: str
-    row_label: str
-    rows: tuple[float, ...]
-    column_label: str
-    columns: tuple[float, ...]
-    judge: Callable[[str, float, float], tuple[int, str]]
 
 
 def scene_of(form: str, bodies: Sequence[Body], size: float) -> Scene:
@@ -172,48 +156,14 @@ MAPS = (
 )  # fmt: skip
 
 
-def summary(form: str, verdicts: Mapping[tuple[float, float], tuple[int, str]]) -> str:
-    """How often each verdict fell, and where and why it was not survived."""
-    numbers = [number for number, _ in verdicts.values()]
-    counts = ", ".join(f"{numbers.count(n)} {name}" for n, name in enumerate(VERDICTS) if n in numbers)
-    bad = [f"{r:g} by {c:g}: {why}" for (r, c), (number, why) in verdicts.items() if number != SURVIVED]
-    return f"  {form:20} {counts}" + "".join(f"\n      {text}" for text in bad[:6])
+STUDY = Stability("stability solid", DIRECTORY, VERDICTS)
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
     """The corners of the maps."""
-    _study(communicator, overrides, lambda values: (values[0], values[min(2, len(values) - 1)]))
+    STUDY.run(communicator, FORMS, [corners(shown) for shown in MAPS], overrides)
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     """Run both forms on all maps; leave a CSV file and a sheet per map in DIRECTORY."""
-    _study(communicator, overrides, lambda values: values)
-
-
-def _study(communicator, overrides, some) -> None:
-    if communicator.size > 1 or overrides:
-        raise InputError(["study stability solid: runs on one rank and takes no overrides"])
-    DIRECTORY.mkdir(parents=True, exist_ok=True)
-    lines = []
-    with threadpool_limits(1):
-        for shown in MAPS:
-            print(f"\n{shown.title}: {shown.row_label} by {shown.column_label}")
-            rows, columns, sheets = some(shown.rows), some(shown.columns), []
-            for name, form in FORMS.items():
-                verdicts = {(r, c): shown.judge(form, r, c) for r in rows for c in columns}
-                print(summary(name, verdicts), flush=True)
-                sheets.append(VerdictMap(name, np.array([[verdicts[r, c][0] for c in columns] for r in rows])))
-                lines += [[shown.name, name, f"{r:g}", f"{c:.3g}", *told(v)] for (r, c), v in verdicts.items()]
-            names = ([f"{v:.3g}" for v in values] for values in (rows, columns))
-            labels = zip((shown.row_label, shown.column_label), names, strict=True)
-            draw_verdicts(DIRECTORY / f"{shown.name}.png", shown.title, sheets, *labels, VERDICTS, across=2)
-    with (DIRECTORY / "stability.csv").open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["map", "form", "row", "column", "verdict", "why"])
-        table.writerows(lines)
-    print(f"\nmaps and table in {DIRECTORY}", flush=True)
-
-
-def told(verdict: tuple[int, str]) -> tuple[str, str]:
-    """A verdict in words."""
-    return list(VERDICTS)[verdict[0]], verdict[1]
+    STUDY.run(communicator, FORMS, MAPS, overrides)
