@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from distfsi.scene.description import (
     LinearEos,
     NoStrength,
     PerfectlyPlastic,
+    PrincipalStress,
     Scatter,
     Tube,
 )
@@ -255,6 +257,39 @@ def test_a_bar_parts_at_its_failure_strain():
     scale = math.sqrt(before["mass"] * before["kinetic"])
     assert np.abs(momentum - before["momentum"]).max() < 1e-12 * scale
     assert energy(part) == pytest.approx(whole, rel=1e-12)
+
+
+def crack_energy(dimensions, spacing, angle=0.0):
+    """[J/m2] that a bar of steel takes when it is pulled apart, but for its motion afterwards."""
+    length, width, speed = 12e-3, 4e-3, 1.0
+    half = np.array([length, *[width] * (dimensions - 1)]) / 2
+    steel = (LinearEos(164e9), Elastic(80e9), None, PrincipalStress(250e6, 4e3, None))
+    bar = body(Box(tuple(-half), tuple(half)), spacing, 7850.0, (0.0,) * dimensions, *steel)
+    bar = replace(bar, lattice_angle=angle)
+    part = total_lagrangian([bar], (-4 * length,) * dimensions, (4 * length,) * dimensions)
+    c = part.columns
+    x = c["position"][:, 0]
+    c["fixed"] = np.abs(x) > 0.5 * length - 3.0 * spacing
+    c["velocity"][:, 0] = np.where(c["fixed"], speed * np.sign(x), 2.0 * speed * x / length)
+    c["toughness"][np.abs(x) < 1.5 * spacing] = 0.8
+    moving, time = part.totals()["kinetic"], 0.0
+    while time < 35e-6:
+        time += step(part)[0]
+    assert len(part.pieces()["piece"]) == 2
+    assert (part.columns["bond_count"] > 0).all()
+    return (part.gravity_work() - part.totals()["kinetic"] + moving) / width ** (dimensions - 1)
+
+
+def test_a_crack_takes_its_energy_at_any_spacing():
+    energies = [crack_energy(2, spacing) for spacing in (1e-3, 5e-4)]
+    assert energies == pytest.approx([4e3, 4e3], rel=0.1)
+    assert energies[0] == pytest.approx(energies[1], rel=0.1)
+
+
+@pytest.mark.full
+def test_a_crack_takes_its_energy_in_space_and_across_the_lattice():
+    assert crack_energy(3, 1e-3) == pytest.approx(4e3, rel=0.15)
+    assert crack_energy(2, 5e-4, math.radians(30.0)) == pytest.approx(4e3, rel=0.15)
 
 
 def test_a_spinning_disc_that_bursts_keeps_its_angular_momentum():

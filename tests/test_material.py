@@ -161,10 +161,24 @@ def test_a_crack_takes_its_energy_at_any_spacing(spacing):
     point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing)
     work = 0.0
     while point.damage[0] < 1.0:
-        before, worn = point.deviator[0, 3], point.wear[0] == 1.0
+        before, worn = point.deviator[0, 3], point.wear[0] >= 1.0
         point.strain(dt, rate * 0.5 * (SHEAR + SHEAR.T))
         work += worn * 0.5 * (before + point.deviator[0, 3]) * rate * dt
     assert work * CRACK_WIDTH * spacing == pytest.approx(energy, rel=0.01)
+
+
+@pytest.mark.parametrize("spacing", [0.25e-3, 1e-3])
+def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
+    """The work of the mean tension counts as that of plastic flow does; the elastic energy of shear does not."""
+    energy, dt, width = 2e4, 2e-9, CRACK_WIDTH * spacing
+    failure = d.JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
+    point, work = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing), 0.0
+    point.wear[:] = 1.0
+    while point.damage[0] < 1.0:
+        before, density = point.normal_stress[0], point.density[0]
+        point.strain(dt, 1e5 * TENSION)
+        work += 0.5 * (before + point.normal_stress[0]) * (7830.0 / point.density[0] - 7830.0 / density)
+    assert work * width == pytest.approx(energy + width * 400e6**2 / (6.0 * 77e9), rel=0.01)
 
 
 @pytest.mark.parametrize("spacing", [0.5e-3, 1e-3, 2e-3])

@@ -14,7 +14,9 @@ from distfsi.physics.bonds import (
     LEAST_GROWTH,
     bond_stress,
     bulk_viscosity,
+    is_other_face,
     least_stretch,
+    most_stretched,
     signal_time,
     whole_step,
     zero_energy_stiffness,
@@ -23,10 +25,11 @@ from distfsi.physics.pair import gradient_correction
 from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
-from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, trace
+from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, scaled, times, trace
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
-VOLUME, BODY, FAILED, LOOSE, EXPOSED, DEBRIS = range(6)  # columns of `facts`: what ghosts are told besides
+VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, CRACK = range(7)  # columns of `facts`: what ghosts are told besides
+SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
 
 @helper
@@ -130,9 +133,50 @@ def keep_fit(
             exposed[i] = 1
 
 
+@helper
+def crack_of(facts, i):
+    """Normal from a particle towards the crack beside it, 0 without."""
+    return tuple(facts[i, CRACK + d] for d in static_range(DIMENSIONS))
+
+
 @driver
-def cut(begin, end, position, reference, facts, key, bond_count, partner, bond, lost):
-    """Cut the bonds whose ends have both failed, where they are stretched, and those of a loose particle.
+def crack(
+    begin, end, spacing, body, bond_count, partner, bond, reference, tension, deformation, damage, facts, normal
+):  # fmt: skip
+    """normal[i] = unit vector, in the reference state, from a damaged particle to the crack beside it.
+
+    The crack of a particle that has failed lies across its most stretched direction, on the side where its bonds are
+    stretched more. A damaged particle just beyond it is its other face. `facts` are those of the step before.
+    """
+    for i in range(begin, end):
+        found = tuple(normal[i, d] for d in static_range(DIMENSIONS))
+        if damage[i] > 0.0 and dot(found, found) == 0.0:
+            axis = most_stretched(matrix_of(deformation, i))
+            across = times(matrix_of(deformation, i), axis)
+            ahead, behind, length2_ahead, length2_behind = 0.0, 0.0, 0.0, 0.0
+            for n in range(bond_count[i]):
+                j = partner[i, n]
+                X, u = difference(reference, 0, j, i), difference(tension, DISPLACEMENT, j, i)
+                w, along = bond_weight(bond, i, n), dot(X, axis)
+                if along > 0.0:
+                    ahead += w * along * dot(u, across)
+                    length2_ahead += w * along * along
+                else:
+                    behind += w * along * dot(u, across)
+                    length2_behind += w * along * along
+                other = crack_of(facts, j)
+                if is_other_face(X, other, spacing[body[i]]) and dot(found, found) == 0.0:
+                    found = tuple(-other[d] for d in static_range(DIMENSIONS))
+            if damage[i] >= 1.0 and dot(found, found) == 0.0 and min(length2_ahead, length2_behind) > 0.0:
+                side = 1.0 if ahead * length2_behind > behind * length2_ahead else -1.0
+                found = tuple(side * axis[d] for d in static_range(DIMENSIONS))
+            for d in static_range(DIMENSIONS):
+                normal[i, d] = found[d]
+
+
+@driver
+def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, partner, bond, lost):
+    """Cut the stretched bonds that cross a crack or whose ends have failed otherwise, and those of a loose particle.
 
     lost[i] = how many bonds particle i has lost; the others keep their order.
     """
@@ -141,8 +185,12 @@ def cut(begin, end, position, reference, facts, key, bond_count, partner, bond, 
         for n in range(bond_count[i]):
             j = partner[i, n]
             x, X = difference(position, 0, j, i), difference(reference, 0, j, i)
-            stretched = facts[i, FAILED] > 0.0 and facts[j, FAILED] > 0.0 and dot(x, x) > dot(X, X)
-            if not (stretched or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
+            mine, other = crack_of(facts, i), crack_of(facts, j)
+            ahead, behind = dot(X, mine), -dot(X, other)
+            crossed = max(ahead, behind) > 0.5 * spacing[body[i]] or min(ahead, behind) > 0.0
+            failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and dot(mine, other) < SAME_FACE
+            stretched = dot(x, x) > dot(X, X)
+            if not (((crossed or failed) and stretched) or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
                 if kept < n:
                     key[i, kept] = key[i, n]
                     partner[i, kept] = j
@@ -167,6 +215,23 @@ def has_failed(damage, i):
 
 
 @driver
+def mark_damaged(begin, end, damage, mark):
+    """mark[i] = 1 where a particle is damaged, else 0."""
+    for i in range(begin, end):
+        mark[i] = 1 if damage[i] > 0.0 else 0
+
+
+@driver
+def look_around(begin, end, bond_count, partner, facts, around):
+    """around[i] = largest damage of a particle and its partners so far; springs once let go are not pressed again."""
+    for i in range(begin, end):
+        largest = max(around[i], facts[i, DAMAGE])
+        for n in range(bond_count[i]):
+            largest = max(largest, facts[partner[i, n], DAMAGE])
+        around[i] = largest
+
+
+@driver
 def mark_parted(begin, end, bond_count, loose, damage, mark):
     """mark[i] = 1 where a particle has failed, is loose or debris, else 0."""
     for i in range(begin, end):
@@ -188,15 +253,17 @@ def mark_debris(begin, end, facts, mark):
 
 
 @driver
-def tell(begin, end, volume, body, loose, exposed, bond_count, damage, facts):
+def tell(begin, end, volume, body, loose, exposed, bond_count, crack, damage, facts):
     """facts[i] = what others must know of a particle, in the columns above."""
     for i in range(begin, end):
         facts[i, VOLUME] = volume[i]
         facts[i, BODY] = 1.0 * body[i]
-        facts[i, FAILED] = 1.0 if has_failed(damage, i) else 0.0
+        facts[i, DAMAGE] = damage[i] if FAILS else 0.0
         facts[i, LOOSE] = 1.0 if loose[i] > 0 else 0.0
         facts[i, EXPOSED] = 1.0 if exposed[i] > 0 else 0.0
         facts[i, DEBRIS] = 1.0 if bond_count[i] == 0 else 0.0
+        for d in static_range(DIMENSIONS):
+            facts[i, CRACK + d] = crack[i, d]
 
 
 # ---- a step ---------------------------------------------------------------------------------------------------------
@@ -205,14 +272,14 @@ def tell(begin, end, volume, body, loose, exposed, bond_count, damage, facts):
 @driver
 def stress_bonds(
     begin, end, body, strength, density, sound, strain, deviator, pressure, viscous, correction, deformation, position,
-    reference, loose, damage, tension,
+    reference, loose, around, tension,
 ):  # fmt: skip
-    """tension[i] = stiffness, displacement and bond stress of particle i. What has cracked resists no strain, seen or
-    unseen; the bonds of a loose particle no longer determine its strain."""
+    """tension[i] = stiffness, displacement and bond stress of particle i. Where bonds cross a crack, what is unseen is
+    its opening; the bonds of a loose particle no longer determine its strain."""
     for i in range(begin, end):
-        kappa = zero_energy_stiffness(density[i], sound[i], strain[i], strength[body[i], 0], strength[body[i], 1])
-        if FAILS:
-            kappa = kappa * (1.0 - damage[i])
+        damage = around[i] if FAILS else 0.0
+        shear_modulus, flow_stress = strength[body[i], 0], strength[body[i], 1]
+        kappa = zero_energy_stiffness(density[i], sound[i], strain[i], damage, shear_modulus, flow_stress)
         S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
         stress = bond_stress(S, pressure[i] + viscous[i], matrix_of(deformation, i), matrix_of(correction, i), kappa)
         tension[i, STIFFNESS] = 0.0 if loose[i] > 0 else kappa
@@ -279,12 +346,6 @@ def stretch(
                 viscous[i] = bulk_viscosity(trace(rates), density[i], h[i], sound[i])
             else:
                 loose[i] = 1
-
-
-@helper
-def scaled(factor, matrix):
-    """`factor` times a matrix."""
-    return tuple(tuple(factor * matrix[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
 
 
 @driver

@@ -12,7 +12,7 @@ from distfsi.physics.concrete import (
     concrete_wear,
     unloading_modulus,
 )
-from distfsi.physics.damage import ductile_softening, ductile_wear, largest_principal, tensile_damage
+from distfsi.physics.damage import crack_share, ductile_wear, largest_principal, tensile_damage
 from distfsi.physics.rotation import polar_rotation, vorticity
 from distfsi.physics.smoothing import dilated
 from distfsi.physics.solid_eos import bulk_modulus, solid_pressure, solid_sound_speed
@@ -140,12 +140,15 @@ def flow(
     bulk = bulk_modulus(density[i], energy[i], p, law)
     sound_speed[i] = solid_sound_speed(density[i], bulk, metal[0], law)
     if FAILS:
-        if increment > 0.0:
-            fracture = tuple(failure[own, k] for k in static_range(FAILURE_CONSTANTS))
-            heat = homologous_temperature(temperature[i], metal)
+        fracture = tuple(failure[own, k] for k in static_range(FAILURE_CONSTANTS))
+        heat = homologous_temperature(temperature[i], metal)
+        if increment > 0.0 and wear[i] < 1.0:
             wear[i] = min(wear[i] + ductile_wear(increment, p, level, dt, heat, toughness[i], fracture), 1.0)
-            if wear[i] == 1.0:
-                damage[i] = min(damage[i] + ductile_softening(increment, level, fracture), 1.0)
+        if wear[i] >= 1.0:
+            tension = min(p, 0.0)
+            wear[i] = min(wear[i] + crack_share(increment * level, fracture), 2.0)
+            stored = crack_share(0.5 * tension * tension / bulk, fracture)
+            damage[i] = max(damage[i], min(wear[i] - 1.0 + stored, 1.0))
     return (p, level / trial if increment > 0.0 else 1.0)
 
 

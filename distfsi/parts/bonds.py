@@ -31,7 +31,10 @@ DRIVERS = (
     kernels.keep_fit,
     kernels.mark_parted,
     kernels.mark_cut,
+    kernels.mark_damaged,
     kernels.mark_debris,
+    kernels.look_around,
+    kernels.crack,
     kernels.tell,
     kernels.cut,
     kernels.stress_bonds,
@@ -58,6 +61,8 @@ class TotalLagrangian:
     viscous_pressure  (n,) [Pa]
     void              (n,) logarithm of how much larger a failed particle is with its void
     piece             (n,) smallest id of all particles that intact bonds hold together, as of label_pieces()
+    around            (n,) largest damage of the particle and its partners so far
+    crack             (n, D) unit vector, in the reference state, towards the crack beside the particle; 0: none
     loose             (n,) 1 when the particle leaves its bonds in the next step
     exposed           (n,) 1 when it lies at a surface
     """
@@ -78,6 +83,7 @@ class TotalLagrangian:
         self._spacing = np.array([body.spacing for body in scene.bodies])
         self._support = 2.0 * scene.smoothing * self._spacing.max()
         self._size = self._device.array(scene.smoothing * self._spacing)
+        self._distance = self._device.array(self._spacing)
         self._dimensions, self._search = dimensions, search
         self._debris = UpdatedLagrangian(kernels, self._device, search, dimensions)
         self._contact = Contact(kernels, self._rows, search, dimensions)
@@ -96,7 +102,8 @@ class TotalLagrangian:
         bonds = np.full((n, width), -1)
         bonds[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = key
         c["bonds"], c["bond_count"] = bonds, count
-        c["viscous_pressure"], c["void"] = np.zeros(n), np.zeros(n)
+        c["viscous_pressure"], c["void"], c["around"] = np.zeros(n), np.zeros(n), np.zeros(n)
+        c["crack"] = np.zeros((n, D))
         c["loose"] = np.zeros(n, dtype=np.int64)
         plan = exchange.ghosts(*c.read("position"), c["id"], self._support, self.asked(c))
         volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
@@ -202,12 +209,16 @@ class TotalLagrangian:
         return self._asked
 
     def flags(self, c: Columns) -> list[float]:
-        """Whether any particle has failed, is loose or debris."""
+        """Whether any particle is damaged; whether any has failed, is loose or debris."""
         bond_count, loose = c.read("bond_count", "loose")
         n = bond_count.shape[0]
         mark = self._device.empty(n, np.int8)
         self._run(n, "mark_parted", bond_count, loose, self._damage(c), mark)
-        return [float(self._rows.any(mark))]
+        parted = self._rows.any(mark)
+        if "damage" not in c:
+            return [0.0, float(parted)]
+        self._run(n, "mark_damaged", *c.read("damage"), mark)
+        return [float(self._rows.any(mark)), float(parted)]
 
     def _damage(self, c: Columns) -> Any:
         return c.read("damage")[0] if "damage" in c else self._device.empty(0)
@@ -215,21 +226,25 @@ class TotalLagrangian:
     def told(self, c: Columns) -> list:
         """Reference position; stiffness, displacement and bond stress; the facts of kernels/bonds.py."""
         axes, D, n = range(self._dimensions), self._dimensions, c.read("id")[0].shape[0]
-        parity = ((), *((a,) for a in axes), *((a, b) for a in axes for b in axes))
-        tension, facts = self._device.empty((n, 1 + D + D * D)), self._device.empty((n, FACTS))
+        vector = tuple((a,) for a in axes)
+        parity = ((), *vector, *((a, b) for a in axes for b in axes))
+        tension, facts = self._device.empty((n, 1 + D + D * D)), self._device.empty((n, FACTS + D))
         material = c.read("density", "sound_speed", "plastic_strain", "deviator", "pressure", "viscous_pressure")
-        shape = c.read("correction", "deformation", "position", "reference", "loose")
-        self._run(n, "stress_bonds", *c.read("body"), self._strength, *material, *shape, self._damage(c), tension)
-        known = c.read("volume", "body", "loose", "exposed", "bond_count")
+        shape = c.read("correction", "deformation", "position", "reference", "loose", "around")
+        self._run(n, "stress_bonds", *c.read("body"), self._strength, *material, *shape, tension)
+        known = c.read("volume", "body", "loose", "exposed", "bond_count", "crack")
         self._run(n, "tell", *known, self._damage(c), facts)
-        return [(*c.read("reference"), "position"), (tension, parity), (facts, ((),) * FACTS)]
+        return [(*c.read("reference"), "position"), (tension, parity), (facts, (*((),) * FACTS, *vector))]
 
     def accelerate(self, c: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Cut bonds that have failed; add the `acceleration` (own, D) of all forces to none, and write the
         time steps (own, 2) that they allow."""
         reference, self._tensions, facts = near.told
         self._place(c, near.plan.key, reference, facts)
-        if near.flags[0]:
+        damaged, parted = near.flags
+        if damaged:
+            self._run(near.own, "look_around", *c.read("bond_count"), self._partner, facts, *c.write("around"))
+        if parted:
             self._cut(c, near, facts)
             _, self._tensions, facts = near.plan.exchange(self.told(c))
             mark = self._device.empty(near.plan.count, np.int8)
@@ -245,8 +260,12 @@ class TotalLagrangian:
     def _cut(self, c: Columns, near: Near, facts: Any) -> None:
         """Cut bonds and fit what is left; a particle that too few bonds hold gets loose for the next step."""
         lost, mark = self._device.empty(near.own, np.int64), self._device.empty(near.own, np.int8)
+        spacing = (self._distance, *c.read("body"))
+        if "damage" in c:
+            known = (*c.read("deformation", "damage"), facts, *c.write("crack"))
+            self._run(near.own, "crack", *spacing, *self._bonds(c), self._reference, self._tensions, *known)
         bonds = (*c.write("bonds", "bond_count"), self._partner, self._bond)
-        self._run(near.own, "cut", near.position, self._reference, facts, *bonds, lost)
+        self._run(near.own, "cut", near.position, self._reference, *spacing, facts, *bonds, lost)
         self._run(near.own, "mark_cut", lost, mark)
         count, rows = self._rows.marked(mark)
         if not count:
@@ -260,7 +279,7 @@ class TotalLagrangian:
     def strain(self, c: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance energy and deformation by `dt` [s] with the old and the new `velocity` (count, D), and write the
         velocity gradient (own, D D) [1/s]; after accelerate()."""
-        if near.flags[0]:
+        if near.flags[1]:
             self._debris.strain(c, near, dt, velocity, gradient)
         motion = self._device.empty((near.plan.count, 2 * self._dimensions))
         self._run(near.plan.count, "mean_motion", near.state, velocity, motion)
@@ -269,6 +288,6 @@ class TotalLagrangian:
         given = (*material, *changed, gradient, *c.write("loose"))
         self._run(near.own, "stretch", dt, *self._bonds(c), self._tensions, motion, *given)
         self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
-        if near.flags[0] and dt > 0.0:
+        if near.flags[1] and dt > 0.0:
             parted = (*c.read("volume", "mass", "density", "bond_count"), self._damage(c), *c.write("void"), gradient)
             self._run(near.own, "open_voids", dt, *parted)

@@ -39,7 +39,7 @@ from distfsi.scene.description import (
 
 ROOM_TEMPERATURE = 293.15  # K, of materials that do not know their own
 NOT_CONCRETE = (0.0,) * 20
-CRACK_WIDTH = 2.0  # spacings: a bond is cut when both its ends have failed, so a crack has two rows of particles
+CRACK_WIDTH = 2.2  # spacings: a row of particles on either side of a crack and, with h = 1.3 spacings, a tenth beyond
 NO_FAILURE = (math.inf, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0)
 
 

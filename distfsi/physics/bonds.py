@@ -13,7 +13,7 @@ from math import log, sqrt
 
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
-from distfsi.physics.tensors import determinant, inverse, product, rows, trace, transposed
+from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, product, rows, scaled, trace, transposed
 
 SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
 SHORTEST = 1e-300  # s: steps of no length strain nothing
@@ -61,14 +61,17 @@ def bulk_viscosity(divergence, density, size, sound_speed):
     return density * jump * (0.5 * VISCOSITY_ALPHA * limiter * sound_speed + VISCOSITY_BETA * jump)
 
 
-def zero_energy_stiffness(density, sound_speed, plastic_strain, shear_modulus, flow_stress):
+def zero_energy_stiffness(density, sound_speed, plastic_strain, damage, shear_modulus, flow_stress):
     """kappa [Pa] in shear moduli; 4/3 of them cancel the leading error that the smoothing of F makes in shear waves.
 
-    Once the particle has flowed, kappa falls faster than the secant modulus, so that it does not hold up the flow. A
-    material without shear has a twentieth of its longitudinal modulus instead of its shear modulus.
+    Once the particle has flowed, kappa falls faster than the secant modulus, so that it does not hold up the flow. So
+    it does with the largest `damage` of the particle and its partners: what F does not see there is a crack that opens,
+    and a stiffness that fell as the stress does would add a constant share to the crack's energy. A material without
+    shear has a twentieth of its longitudinal modulus instead of its shear modulus.
     """
     softer = 1.0 + SOFTENING * shear_modulus * plastic_strain / max(flow_stress, 1e-300)
-    return ZERO_ENERGY * max(shear_modulus, 0.05 * density * sound_speed * sound_speed) / softer
+    whole = (1.0 - damage) * (1.0 - damage)
+    return ZERO_ENERGY * whole * whole * max(shear_modulus, 0.05 * density * sound_speed * sound_speed) / softer
 
 
 def bond_stress(deviator, pressure, deformation, correction, stiffness):
@@ -102,3 +105,33 @@ def signal_time(shortest, sound_speed, viscous_pressure, density):
     """Longest step [s] that signals allow, with safety 0.3; `shortest` [m]: h along the most compressed direction."""
     signal = sound_speed + viscous_pressure / (density * sound_speed)
     return 0.3 * shortest / signal
+
+
+def most_stretched(deformation):
+    """Unit vector along the largest principal stretch, in the reference state: a column of a high power of a matrix
+    that has the axes of the strain and no negative eigenvalue."""
+    squared = product(transposed(deformation), deformation)
+    strain = tuple(
+        tuple(squared[a][b] - (1.0 if a == b else 0.0) for b in static_range(DIMENSIONS))
+        for a in static_range(DIMENSIONS)
+    )
+    size = sqrt(trace(product(strain, strain))) + SHORTEST
+    power = identity_plus(1.0 / size, strain)
+    for _ in static_range(6):
+        power = product(power, power)
+        power = scaled(1.0 / trace(power), power)
+    column, largest = power[0], power[0][0]
+    for a in static_range(1, DIMENSIONS):
+        column = tuple(power[a][d] if power[a][a] > largest else column[d] for d in static_range(DIMENSIONS))
+        largest = max(largest, power[a][a])
+    length = sqrt(dot(column, column))
+    return tuple(column[d] / length for d in static_range(DIMENSIONS))
+
+
+def is_other_face(X, normal, spacing):
+    """Whether a particle is the first beyond the crack that lies from a partner along its `normal`; X: to the partner.
+
+    No normal (0) says no.
+    """
+    beyond = -dot(X, normal)
+    return 0.5 * spacing < beyond and beyond < 1.5 * spacing and dot(X, X) - beyond * beyond < 0.75 * spacing * spacing

@@ -48,10 +48,13 @@ def ductile_wear(increment, pressure, stress, dt, homologous, toughness, failure
     return increment / limit if triaxiality > CRUSHED else 0.0
 
 
-def ductile_softening(increment, stress, failure):
-    """Growth of D by a plastic strain `increment` at the flow `stress`, once the fracture strain is used up."""
+def crack_share(work, failure):
+    """D after a `work` [J/m3] on the intact material: plastic, and of its mean tension, which a crack lets go as well.
+
+    The damaged material takes 1 - D of it, half of it all until D = 1: the crack's energy over its width.
+    """
     D1, D2, D3, D4, D5, reference_rate, tensile_strength, fracture_energy, size = failure
-    return increment * stress * size / (2.0 * max(fracture_energy, BRITTLE))
+    return work * size / (2.0 * max(fracture_energy, BRITTLE))
 
 
 def tensile_damage(principal, modulus, toughness, failure):

@@ -35,6 +35,11 @@ def trace(matrix):
     return sum(matrix[a][a] for a in static_range(DIMENSIONS))
 
 
+def scaled(factor, matrix):
+    """`factor` times a matrix."""
+    return tuple(tuple(factor * matrix[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+
+
 def identity_plus(factor, matrix):
     """Unit matrix plus `factor` times a matrix."""
     return tuple(
