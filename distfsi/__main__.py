@@ -30,6 +30,8 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "stability solid",
     "frontier coupling",
     "stability coupling",
+    "fragments",
+    "tube_alone",
 )
 
 

@@ -11,6 +11,7 @@ feels them.
 
 from math import log, sqrt
 
+from distfsi.physics.pair import SHOCKED
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
 from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, product, rows, scaled, trace, transposed
@@ -57,8 +58,8 @@ def bulk_viscosity(divergence, density, size, sound_speed):
     bending and plastic flow are not damped.
     """
     jump = max(-size * divergence, 0.0)
-    limiter = min(30.0 * jump / sound_speed, 1.0)
-    return density * jump * (0.5 * VISCOSITY_ALPHA * limiter * sound_speed + VISCOSITY_BETA * jump)
+    linear = 0.5 * VISCOSITY_ALPHA * min(SHOCKED * jump, sound_speed)
+    return density * jump * (linear + VISCOSITY_BETA * jump)
 
 
 def zero_energy_stiffness(density, sound_speed, plastic_strain, damage, shear_modulus, flow_stress):

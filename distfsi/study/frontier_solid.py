@@ -15,7 +15,7 @@ TOTAL, UPDATED = "solid.form=total_lagrangian", "solid.form=updated_lagrangian"
 VARIANTS: dict[str, tuple[str, ...]] = {
     "total Lagrangian": (TOTAL,),
     "total, alpha 0, beta 1": (TOTAL, "solid.viscosity_alpha=0", "solid.viscosity_beta=1"),
-    "total, zero energy x3": (TOTAL, "solid.zero_energy=0.3"),
+    "total, zero energy 0.3": (TOTAL, "solid.zero_energy=0.3"),
     "total, Green-Naghdi": (TOTAL, "solid.objective_rate=green_naghdi"),
     "updated Lagrangian": (UPDATED,),
     "updated, alpha 0.5, beta 1": (UPDATED, "solid.viscosity_alpha=0.5", "solid.viscosity_beta=1"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
@@ -127,24 +129,36 @@ def flyer(simulation: Simulation) -> list[Figure]:
 
 
 def taylor(simulation: Simulation) -> list[Figure]:
-    """Length of the bar and radius of its foot at the end. Surfaces lie half a particle beyond the outermost ones, in
-    the proportions that these had at the start."""
+    """Length of the bar and radius of its foot at the end, of the surfaces beyond the outermost particles."""
     bar: Cylinder = simulation.scene.solid.bodies[0].shape
-    c, before = by_id(simulation), energy(simulation)
-    start, from_axis = c["position"][:, 0], np.hypot(*c["position"].T[1:])
-    ends = np.unique(start.round(9))
-    top, foot = np.isclose(start, ends[-1]), np.isclose(start, ends[0])
-    rim = from_axis > from_axis.max() - 0.25 * simulation.scene.solid.bodies[0].spacing
+    before, start, spacing = energy(simulation), by_id(simulation)["position"], simulation.scene.solid.bodies[0].spacing
+    from_axis, along = np.hypot(*start.T[1:]), np.unique(start[:, 0].round(9))
+    top, foot = (np.isclose(start[:, 0], along[layer]) for layer in (-1, 0))
+    rim = np.flatnonzero(foot & (from_axis > from_axis[foot].max() - 0.25 * spacing))
+    ends = np.where([True, False, False], bar.end[0], start[top])
+    edge = np.where([True, False, False], 0.0, start[rim] * bar.radius / from_axis[rim, None])
     while not simulation.done:
         simulation.step()
-    position = by_id(simulation)["position"]
-    length = position[top, 0].mean() * bar.end[0] / ends[-1]
-    radius = np.hypot(*position.T[1:])[foot & rim].mean() * bar.radius / from_axis[foot & rim].mean()
+    now = by_id(simulation)["position"]
+    length = carried(start, now, np.flatnonzero(top), ends, 1.5 * spacing)[:, 0].mean()
+    radius = np.hypot(*carried(start, now, rim, edge, 1.5 * spacing).T[1:]).mean()
     return [
         Figure("length [m]", float(length), 21.46e-3, 0.03),  # 21.26 to 21.66 mm, and 2 %
         Figure("foot [m]", float(radius), 7.07e-3, 0.044),  # 6.9 to 7.24 mm, and 2 %
         kept_energy(simulation, before),
     ]
+
+
+def carried(start: np.ndarray, now: np.ndarray, particles: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
+    """Where the material `points` (k, 3), each near one of the `particles`, have gone from `start` to `now`, both
+    (n, 3) [m]: by the gradient that fits the neighbours within `reach`. All planes through the origin are mirrors."""
+    mirrors = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
+    start, now = ((x * mirrors[:, None, :]).reshape(-1, 3) for x in (start, now))
+    found = []
+    for i, near, point in zip(particles, cKDTree(start).query_ball_point(start[particles], reach), points, strict=True):
+        gradient = np.linalg.lstsq(start[near] - start[i], now[near] - now[i])[0]
+        found.append(now[i] + (point - start[i]) @ gradient)
+    return np.array(found)
 
 
 def verney(simulation: Simulation) -> list[Figure]:
