@@ -71,7 +71,7 @@ class Law:
 
 
 SCATTER = Law("scatter of the failure strain", 0.2, 15.0, 0.0, 1.0, 12.0)
-SOFTENING = Law("softening by the crack energy", 0.05, 200.0, 8e3, 2.0 / 3.0, 20.0)
+SOFTENING = Law("softening by the crack energy", 0.05, 15.0, 8e3, 2.0 / 3.0, 20.0)
 
 
 def ring(rate: float, thickness: float, rows: int, failure: Failure | None) -> Simulation:
@@ -104,7 +104,7 @@ def breaks(law: Law, rate: float, seed: int, finer: int = 1) -> int:
     """In a quarter of the ring, which is ROWS particles thick, or `finer` times as many."""
     thickness = ROWS * law.size(rate) / law.particles
     simulation = ring(rate, thickness, ROWS * finer, law.failure(thickness, seed))
-    expand(simulation, rate, law.strain + 0.1)
+    expand(simulation, rate, law.strain + 0.2)
     return int((simulation.solid.pieces()["particles"] >= DUST * finer**2).sum()) - 1
 
 
