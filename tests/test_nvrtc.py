@@ -5,6 +5,8 @@ import pytest
 from distfsi.device import nvrtc
 from distfsi.mesh.communicator import Communicator
 from distfsi.study import kernels, works
+from mpi_solid import bursting_ball, step
+from test_cuda_text import NOT_REACHED
 
 FEW = (("one gas", 1, "float32"), ("two gases", 2, "float64"), ("TNT and air", 2, "float32"))
 ALL = [(name, D, real) for name in kernels.FLUIDS for D in (1, 2, 3) for real in ("float64", "float32")]
@@ -36,17 +38,35 @@ def test_the_stage_spills_nothing(monkeypatch, name, dimensions, real, architect
             assert row["float64"] < 40 < row["float32"]
 
 
-@pytest.mark.parametrize(
-    "architectures", [("sm_90",), pytest.param(kernels.ARCHITECTURES, marks=pytest.mark.full)], ids=len
-)
-def test_solid_and_coupling_compile(monkeypatch, architectures):
+def coupled_kernels():
     """All that a coupled scene calls."""
-    monkeypatch.setattr(kernels, "ARCHITECTURES", architectures)
-    found = kernels.coupled_kernels(works.blast_on_copper(8, 2), Communicator())
-    rows = list(kernels.rows("", 2, found))
-    assert "fill_cells" in {row["kernel"] for row in rows}
-    assert len({row["kernel"] for row in rows}) > 20
-    assert all(0 < row["registers"] < 255 for row in rows)
+    return kernels.coupled_kernels(works.blast_on_copper(8, 2), Communicator())
+
+
+def kernels_of_debris():
+    """What no other scene calls."""
+    team = kernels.Listening()
+    ball, _ = bursting_ball(team)
+    for _ in range(62):
+        step(ball)
+    found = [(kernel, arguments) for kernel, arguments in team.kept.values() if kernel.name in NOT_REACHED]
+    assert {kernel.name for kernel, _ in found} == set(NOT_REACHED)
+    return found
+
+
+@pytest.mark.parametrize("found", [coupled_kernels, kernels_of_debris])
+def test_solid_and_coupling_compile(found):
+    """They are compiled once and kept."""
+    names = {kernel.name for kernel, arguments in found() if nvrtc.cubin(kernel.name, kernel.text(arguments), "sm_90")}
+    assert "fill_cells" in names or "cut" in names
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("found", [coupled_kernels, kernels_of_debris])
+def test_solid_and_coupling_fit_into_registers(found):
+    """For all architectures."""
+    for row in kernels.rows("", 2, found()):
+        assert 0 < row["registers"] < 255, row
 
 
 def test_a_text_that_is_no_cuda_is_refused():

@@ -203,7 +203,7 @@ class WallGeometry:
             found,
         )  # fmt: skip
         counts = self.team.get(found)
-        in_blocks = counts.reshape(self.blocks.local_count, -1, 3).sum(axis=1)
+        in_blocks = counts.reshape(self.blocks.local_count, prod(self.blocks.shape[:2]), 3).sum(axis=1)
         near.here()[(near.here() != kernels.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
         near.changed()
         first = self.team.array(np.cumsum(counts, axis=0) - counts)
