@@ -43,8 +43,8 @@ DIRECTORY = Path("out/study_stability_coupling")
 SCHEMES = {"cut cells": "cut_cells", "paper": "paper"}
 SURVIVED, RANG, LEAKED, FAILED = range(4)
 VERDICTS = {"survived": "tab:green", "rang": "tab:olive", "leaked": "tab:orange", "failed": "tab:red"}
-CFL = (0.1, 0.3, 0.5, 0.7, 0.9)
-CELLS, ACROSS = 100, 24  # cells along a tube; across the box of a shell
+CFL = (0.1, 0.5, 0.9)
+CELLS, ACROSS = 50, 24  # cells along a tube; across the box of a shell
 SWINGS = 1.2  # total variation of the body's velocity over its range
 LEAK = 1e-9  # of the mass behind the wall
 MOST_STEPS = 4000
@@ -108,7 +108,7 @@ def pushed(scheme: str, ratio: float, cfl: float) -> Verdict:
     """A plate two cells thick, so many times as dense as the gas, pressed by 10 : 1."""
     h = 1.0 / CELLS
     plate = Body(
-        "plate", Box((0.4,), (0.4 + 2 * h,)), 0.5 * h, ratio, (0.0,), LinearEos(100.0 * ratio), NoStrength(), None
+        "plate", Box((0.4,), (0.4 + 2 * h,)), 0.5 * h, ratio, (0.0,), LinearEos(100.0 * sqrt(ratio)), NoStrength(), None
     )
     regions = [(PureState(1.0, 1.0), None), (PureState(1.0, 10.0), Box((0.0,), (0.4 + h,)))]
     end = min(0.3, 0.02 * sqrt(ratio))
@@ -150,7 +150,7 @@ MAPS = (
     ),
     Map(
         "thickness", "Ring around compressed gas: walls at all angles", "pressure ratio", (10.0, 1e3, 1e5),
-        "thickness of the wall in cells", (0.5, 1.0, 1.5, 2.0, 4.0), shell,
+        "thickness of the wall in cells", (0.5, 1.0, 2.0, 4.0), shell,
     ),
     Map(
         "impact", "Shock in water hits a steel plate", "pressure [Pa]",

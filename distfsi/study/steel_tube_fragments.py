@@ -94,23 +94,27 @@ def _measured(p: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 def line(f: Fragments) -> str:
     """A specimen as a line of the table."""
+    head = f"{f.seed:4} {1e6 * f.broken_at:8.1f} {f.expansion:8.2f} {len(f.width):8}"
+    if not len(f.width):
+        return f"{head}  only dust"
     means = (1e3 * f.width.mean(), 1e3 * f.thickness.mean(), f.speed.mean(), 100.0 * f.share)
-    numbers = "{:9.2f} {:9.2f} {:9.0f} {:9.0f}".format(*means)
-    return f"{f.seed:4} {1e6 * f.broken_at:8.1f} {f.expansion:8.2f} {len(f.width):8} {numbers}"
+    return head + "{:9.2f} {:9.2f} {:9.0f} {:9.0f}".format(*means)
 
 
 def maps(directory: Path, what: str) -> list[Picture]:
     """Fragments, or speeds of gas and wall, at the times SHOWN (after the paper's Figs. 25, 26)."""
     pictures = []
-    frames = dict(series(directory, "particles"))
-    for time, path in series(directory, "cells"):
-        if min(abs(time - shown) for shown in SHOWN) < 1e-9:
-            _, cells, lower, spacing = read_cells(path)
-            values = _drawn(cells, read_particles(frames[time])[1], lower, spacing, what)
-            size = [1e3 * n * s for n, s in zip(values.shape[::-1], spacing[:2], strict=True)]
-            label = {"speed": "speed [m/s]", "piece": "fragments"}[what]
-            extent = (0.0, size[0], 0.0, size[1])
-            pictures.append(Picture(f"{label}, {1e6 * time:.0f} us", values, extent, "turbo", label=""))
+    particles, cells = series(directory, "particles"), series(directory, "cells")
+    for shown in SHOWN:
+        number = min(range(len(cells)), key=lambda n: abs(cells[n][0] - shown))
+        time, path = cells[number]
+        _, fields, lower, spacing = read_cells(path)
+        values = _drawn(fields, read_particles(particles[number][1])[1], lower, spacing, what)
+        size = [1e3 * n * s for n, s in zip(values.shape[::-1], spacing[:2], strict=True)]
+        title = {"speed": "speed [m/s]", "piece": "fragments"}[what]
+        bar = "" if what == "speed" else None
+        extent = (0.0, size[0], 0.0, size[1])
+        pictures.append(Picture(f"{title}, {1e6 * time:.0f} us", values, extent, "turbo", label=bar))
     return pictures
 
 
