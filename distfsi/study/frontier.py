@@ -89,7 +89,7 @@ class Frontier:
                 print("  front: " + "; ".join(outcome.name for outcome in best))
                 self.draw(problem, outcomes, best)
                 rows += [(problem, outcome, outcome in best) for outcome in outcomes]
-        self.write(rows)
+                self.write(rows)
         print(f"\ntable and charts in {self.directory}", flush=True)
 
     def draw(self, problem: Any, outcomes: Sequence[Outcome], best: Sequence[Outcome]) -> None:
