@@ -150,11 +150,11 @@ def _study(communicator, overrides, cases, seeds) -> None:
 
 
 def told(name: str, found: Sequence[Burst]) -> str:
-    """Means over the seeds."""
-    mean = {key: np.mean([getattr(b, key) for b in found]) for key in Burst.__annotations__}
-    thickness, width = np.mean([b.thickness for b in found]), np.mean([b.width for b in found])
+    """Means over the seeds that broke."""
+    names = (*Burst.__annotations__, "thickness", "width")
+    mean = {name: np.nanmean([getattr(b, name) for b in found]) for name in names}
     return (
         f"  fracture strain {name:10}  first failure at r/r0 {mean['first_failure']:.2f}, first break at"
-        f" {mean['first_break']:.2f} ({1e6 * mean['break_time']:.1f} us), wall {1e3 * thickness:.2f} mm,"
-        f" {mean['pieces']:.0f} pieces {1e3 * width:.2f} mm wide, {mean['velocity']:.0f} m/s"
+        f" {mean['first_break']:.2f} ({1e6 * mean['break_time']:.1f} us), wall {1e3 * mean['thickness']:.2f} mm,"
+        f" {mean['pieces']:.0f} pieces {1e3 * mean['width']:.2f} mm wide, {mean['velocity']:.0f} m/s"
     )
