@@ -9,12 +9,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from distfsi.device.seam import Columns, Device, Pair
 from distfsi.errors import InputError
 from distfsi.mesh.blocks import Blocks
-from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.route import Route
 from distfsi.mesh.rows import Rows, chunks
 
 IMAGES = 8  # an id and its images: bit a of an image's number says that it is mirrored along axis a
@@ -22,39 +21,6 @@ IMAGES = 8  # an id and its images: bit a of an image's number says that it is m
 # How a value changes in an image: "position" is mirrored about the plane; otherwise, for each component, the axes whose
 # reflection changes its sign: scalar ((),), vector ((0,), (1,)), symmetric tensor xx, yy, xy ((0, 0), (1, 1), (0, 1)).
 Parity = str | tuple[tuple[int, ...], ...]
-
-
-class Route:
-    """Who sends how many rows to whom: found once, then used for any number of transfers."""
-
-    def __init__(self, communicator: Communicator, ranks: np.ndarray) -> None:
-        """Collective. `ranks` (n,) ascending: where each of the rows to come goes; never this rank."""
-        self._world = communicator.world
-        leaving = np.bincount(ranks, minlength=communicator.size)
-        arriving = np.empty_like(leaving)
-        self._world.Alltoall(leaving, arriving)
-        self._leaving, self._arriving = self._slices(leaving), self._slices(arriving)
-        self.leaving, self.arriving = len(ranks), int(arriving.sum())
-
-    @staticmethod
-    def _slices(counts: np.ndarray) -> list[tuple[int, slice]]:
-        ends = np.cumsum(counts)
-        return [(int(r), slice(ends[r] - counts[r], ends[r])) for r in np.flatnonzero(counts)]
-
-    def transfer(self, rows: np.ndarray, arrived: np.ndarray) -> None:
-        """Send `rows` (n, …); those from all others arrive in rank order, of the same type. One message per pair."""
-        requests = [self._world.Irecv(arrived[part].view(np.uint8), rank) for rank, part in self._arriving]
-        requests += [self._world.Isend(rows[part].view(np.uint8), rank) for rank, part in self._leaving]
-        MPI.Request.Waitall(requests)
-
-    def brought(self, columns: dict[str, np.ndarray]) -> np.ndarray:
-        """Send the rows (n, …) of all columns as one structured array; those that arrive, as another."""
-        dtype = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
-        rows, arrived = np.empty(self.leaving, dtype), np.empty(self.arriving, dtype)
-        for name, column in columns.items():
-            rows[name] = column
-        self.transfer(rows, arrived)
-        return arrived
 
 
 class ParticleExchange:
