@@ -46,7 +46,8 @@ DUST = 8  # particles: what is smaller is no piece
 @dataclass(frozen=True)
 class Burst:
     """What became of a tube: expansion r/r0 and time [s] when the first particle failed, when the first bonds were cut
-    through the whole wall, and the pieces of a whole ring at the end (nan: never)."""
+    through the whole wall (nan: never), and the most pieces of a whole ring that there were at a time: later on, walls
+    that have failed turn into debris."""
 
     first_failure: float
     first_break: float
@@ -81,6 +82,7 @@ def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
     inmost = solid.columns["id"][start < start.min() + 0.25 * SPACING]
     inset = start.min() ** 2 - 30e-3**2  # times pi: area inside the inmost particles, which stays
     first_failure = first_break = break_time = math.nan
+    most = 1
     while time < end:
         solid.prepare()
         dt = solid.time_step()[0]
@@ -95,12 +97,13 @@ def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
         time += dt
         if math.isnan(first_failure) and (solid.columns["damage"] >= 1.0).any():
             first_failure = radius / 30e-3
-        if math.isnan(first_break) and not math.isnan(first_failure) and _pieces(solid) > 1:
+        if not math.isnan(first_failure):
+            most = max(most, _pieces(solid))
+        if math.isnan(first_break) and most > 1:
             first_break, break_time = radius / 30e-3, time
     totals = solid.totals()
     velocity = math.sqrt(2.0 * totals["kinetic"] / totals["mass"])
-    breaks = _pieces(solid) - 1
-    return Burst(first_failure, first_break, break_time, 4.0 * breaks if breaks else math.nan, velocity)
+    return Burst(first_failure, first_break, break_time, 4.0 * (most - 1) if most > 1 else math.nan, velocity)
 
 
 def _pieces(solid) -> int:
@@ -142,9 +145,7 @@ def _study(communicator, overrides, cases, seeds) -> None:
             found = [burst(scaled(share), seed, end) for seed in range(1, seeds + 1)]
             for seed, b in enumerate(found, 1):
                 numbers = (b.first_failure, b.first_break, b.break_time, b.thickness, b.pieces, b.width, b.velocity)
-                table.writerow(
-                    [f"{name} of the tabulated" if share < 1.0 else name, seed, *(f"{n:.4g}" for n in numbers)]
-                )
+                table.writerow([share, seed, *(f"{n:.4g}" for n in numbers)])
             print(told(name, found), flush=True)
     print(f"\ntable in {DIRECTORY}", flush=True)
 
