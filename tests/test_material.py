@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from distfsi.device import cpu
+from distfsi.device.seam import Columns
 from distfsi.kernels.material import deform
 from distfsi.parts.materials import CRACK_WIDTH, Materials, concrete_constants, weibull
 from distfsi.physics import concrete, damage, strength
@@ -29,8 +30,9 @@ class Point:
         constants = {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2} | materials.constants
         self.deform, self.tables = cpu.build((deform,), constants).deform, materials.tables
         self.body, ids = np.zeros(count, dtype=int), np.arange(count)
-        self.columns = materials.initial(self.body, ids, np.full(count, spacing**D))
-        self.columns |= {"energy": np.zeros(count), "density": np.full(count, density), "h": np.full(count, 1e-3)}
+        columns = materials.initial(self.body, ids, np.full(count, spacing**D))
+        columns |= {"energy": np.zeros(count), "density": np.full(count, density), "h": np.full(count, 1e-3)}
+        self.columns = Columns(cpu.Team(1), columns)
         self.state = materials.state(self.columns)
         self.strain(0.0, np.zeros((D, D)))
 

@@ -369,7 +369,7 @@ class CutCells:
         """Bytes of this rank's fields, the corners' as if they were as many as cells."""
         fields = (self.kind, self.swept, *self.wall.fractions, *self.wall.apertures)
         cells, D = self.kind.nbytes, self._dimensions
-        return sum(field.nbytes for field in fields) + cells * (D + 8 * D + 2 * 8)
+        return sum(field.nbytes for field in fields) + cells * (2 + D + 8 * D + 2 * 8)
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells in the band around the wall."""
