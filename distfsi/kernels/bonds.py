@@ -187,8 +187,9 @@ def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, 
             x, X = difference(position, 0, j, i), difference(reference, 0, j, i)
             mine, other = crack_of(facts, i), crack_of(facts, j)
             ahead, behind = dot(X, mine), -dot(X, other)
-            crossed = max(ahead, behind) > 0.5 * spacing[body[i]] or min(ahead, behind) > 0.0
-            failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and dot(mine, other) < SAME_FACE
+            faces = dot(mine, other) < SAME_FACE
+            crossed = max(ahead, behind) > 0.5 * spacing[body[i]] or (faces and min(ahead, behind) > 0.0)
+            failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and faces
             stretched = dot(x, x) > dot(X, X)
             if not (((crossed or failed) and stretched) or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
                 if kept < n:
