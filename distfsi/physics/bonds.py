@@ -11,7 +11,6 @@ feels them.
 
 from math import log, sqrt
 
-from distfsi.physics.pair import SHOCKED
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
 from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, product, rows, scaled, trace, transposed
@@ -19,6 +18,7 @@ from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, pr
 SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
 SHORTEST = 1e-300  # s: steps of no length strain nothing
 LEAST_GROWTH = 0.1  # of the volume in a step that can be taken
+SHOCKED = 30.0  # jumps of velocity to the sound speed, above which viscosity has its linear part in full
 
 
 def whole_step(before, after, dt):

@@ -11,8 +11,6 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA
 from distfsi.physics.tensors import dot, identity_plus, inverse, least_eigenvalue, product, rows, times
 
-SHOCKED = 30.0  # approach speeds to the sound speed, above which viscosity has its linear part in full
-
 
 def approach_speed(dv, dx, distance2, h):
     """-phi of Eq. 6 [m/s] if the particles approach each other, else 0."""
@@ -22,10 +20,10 @@ def approach_speed(dv, dx, distance2, h):
 def viscosity(approach, sound_speed, density):
     """Monaghan's Pi [m5/(kg s2)] of an approach speed at the mean sound speed and density (Eq. 6).
 
-    As in the bonds' viscosity, the linear part is limited to jumps that are not small beside the sound speed.
+    Its linear part is not limited to shocks as that of the bonds is: without it at small jumps a body that turns grows
+    waves between its particles.
     """
-    linear = VISCOSITY_ALPHA * min(SHOCKED * approach, sound_speed)
-    return approach * (linear + VISCOSITY_BETA * approach) / density
+    return approach * (VISCOSITY_ALPHA * sound_speed + VISCOSITY_BETA * approach) / density
 
 
 def gradient_correction(moment):
