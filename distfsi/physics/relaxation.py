@@ -20,6 +20,7 @@ from distfsi.physics.symbols import CLOSED_FORM, MINIMUM_FRACTION, OMEGA_1, OMEG
 
 REFITS = 3  # with JWL both pressures agree to 1e-6 after imbalances up to a factor 2, to 1e-2 after a factor 10
 SETTLED = 1e-6  # of the smaller volume fraction: the last fit's step, whose error is about its square
+TRACE = 1e-5  # the least volume fraction that counts as such: smaller ones are settled to its square all the same
 DEEPEST = -0.9  # a phase pressure may fall by this part of p + P in one stage; the total energy is not touched
 NEAREST = 1.000001  # to the volume at which a phase's pressure has no bound
 
@@ -98,7 +99,7 @@ def relaxed_fraction_change(phases):
             now1, stiff1, now2, stiff2 = phases_after(phases, change)
             further = fraction_change_of_fit(k1 + change, now1, stiff1, k2 - change, now2, stiff2)
             change = min(max(change + further, lowest), highest)
-        return (change, SETTLED * min(a1 + change, a2 - change) - abs(further))
+        return (change, SETTLED * max(min(a1 + change, a2 - change), TRACE) - abs(further))
 
 
 def halved_range(phases, low, high):
