@@ -18,8 +18,8 @@ Verdict = tuple[int, str]  # its number among a study's verdicts, the first of w
 
 
 @dataclass(frozen=True)
-class Map:
-    """Runs over a hardness (rows) by another (columns); judge(method, row, column) makes one."""
+class Plane:
+    """A hardness (rows) by another (columns)."""
 
     name: str
     title: str
@@ -27,6 +27,12 @@ class Map:
     rows: tuple[float, ...]
     column_label: str
     columns: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Map(Plane):
+    """Runs over two hardnesses; judge(method, row, column) makes one."""
+
     judge: Callable[[str, float, float], Verdict]
 
 

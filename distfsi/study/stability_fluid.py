@@ -28,6 +28,7 @@ from distfsi.study.choices import Method, name_of, settings, varied_alone
 from distfsi.study.exact import RIGHTWARD, Material, PureState, exact_riemann, wave_into
 from distfsi.study.problems import INPUTS, centers, fields, start
 from distfsi.study.references import AIR, WATER
+from distfsi.study.stability import Plane
 
 DIRECTORY = Path("out/study_stability_fluid")
 CELLS = 50
@@ -57,15 +58,9 @@ class Tube:
 
 
 @dataclass(frozen=True)
-class Map:
-    """Tubes over two parameters: `rows` (the hardness) by `columns`; the CFL number is either a column's or `cfl`."""
+class Map(Plane):
+    """Tubes over two hardnesses; the CFL number is either a column's or `cfl`."""
 
-    name: str
-    title: str
-    row_label: str
-    rows: tuple[float, ...]
-    column_label: str
-    columns: tuple[float, ...]
     tube: Callable[[float, float], Tube]
     cfl: float | None = None
 
