@@ -97,7 +97,7 @@ def numba_text(
     root = emission.add(driver, {})
     literals, parts = _TypedLiterals(), []
     for source, tree in callees_first(emission.functions):
-        text = ast.unparse(ast.fix_missing_locations(literals.visit(tree)))
+        text = ast.unparse(literals.visit(tree))
         kind = "driver" if tree.name == root and source.kind == "formula" else source.kind
         parts.append(f"# {source.place}\n@{kind}\n{text}")
     values = [f"{name} = real({_number(value)})" for value, name in literals.names.items()]

@@ -8,12 +8,13 @@ the module and line it stands on.
 from __future__ import annotations
 
 import ast
-import copy
 import inspect
 import operator
 import textwrap
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
 KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "len", "real")
@@ -55,10 +56,37 @@ class Source:
         return f"{module}.py, line {self.function.__code__.co_firstlineno}"
 
     def tree(self) -> ast.FunctionDef:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(self.function))).body[0]
+        """A tree of its own for each call."""
+        tree = _parsed(self.function)
         if not isinstance(tree, ast.FunctionDef):
             raise NotInSubset(f"{self.place}: only plain functions can be emitted")
-        return tree
+        return copied(tree)
+
+
+@cache
+def _parsed(function: Callable) -> ast.stmt:
+    return ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+
+
+def copied(node: ast.AST) -> ast.AST:
+    """A tree with nodes of its own, several times as fast as by copy.deepcopy."""
+    new = type(node)()
+    for name, value in vars(node).items():
+        if isinstance(value, list):
+            value = [copied(item) if isinstance(item, ast.AST) else item for item in value]
+        elif isinstance(value, ast.AST) and not isinstance(value, ast.expr_context):
+            value = copied(value)
+        setattr(new, name, value)
+    return new
+
+
+def stored_names(node: ast.AST, sometimes: tuple[type, ...], within: bool = False) -> Iterator[tuple[str, bool]]:
+    """Each name that is assigned to, and whether within a statement of a kind that may run never or more than once."""
+    within = within or isinstance(node, sometimes)
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        yield node.id, within
+    for child in ast.iter_child_nodes(node):
+        yield from stored_names(child, sometimes, within)
 
 
 def literal(value: object) -> ast.expr:
@@ -103,16 +131,11 @@ class Fold(ast.NodeTransformer):
         tree.decorator_list, tree.returns = [], None
         for argument in tree.args.args:
             argument.annotation = None
-        self.locals = {a.arg for a in tree.args.args} | {
-            n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-        }
-        assigned = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
         sometimes = (ast.For, ast.While, ast.AugAssign, *((ast.If,) if self.in_kernel else ()))
-        parts = [n for n in ast.walk(tree) if isinstance(n, sometimes)]
-        inside = {
-            n.id for part in parts for n in ast.walk(part) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-        }
-        self.propagate = {name for name in assigned if assigned.count(name) == 1} - inside
+        stored = list(stored_names(tree, sometimes))
+        times = Counter(name for name, _ in stored)
+        self.locals = {a.arg for a in tree.args.args} | set(times)
+        self.propagate = {name for name, within in stored if times[name] == 1 and not within}
         tree.body = self.statements(tree.body)
         if not self.in_kernel:
             self.refuse_integers(tree)
@@ -187,7 +210,7 @@ class Fold(ast.NodeTransformer):
             out = []
             for value in self.static_values(node.iter):
                 self.known[node.target.id] = ast.Constant(value)
-                out += self.statements(copy.deepcopy(node.body))
+                out += self.statements([copied(statement) for statement in node.body])
             self.known.pop(node.target.id, None)
             return out
         if not self.in_kernel:
@@ -217,7 +240,7 @@ class Fold(ast.NodeTransformer):
         if not isinstance(node.ctx, ast.Load):
             return node
         if node.id in self.known:
-            return copy.deepcopy(self.known[node.id])
+            return copied(self.known[node.id])
         if node.id in self.locals:
             return node
         try:
@@ -346,7 +369,7 @@ class Fold(ast.NodeTransformer):
         except KeyError:
             raise self.refuse(node, f"{name} is not a formula and the scene binds nothing to it") from None
         if constant is not None:
-            return copy.deepcopy(constant)
+            return copied(constant)
         node.func = ast.Name(emitted, ast.Load())
         return node
 
@@ -362,7 +385,7 @@ class Fold(ast.NodeTransformer):
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "static_range"
 
     def static_values(self, call: ast.Call) -> range:
-        bounds = [constant_of(self.visit(copy.deepcopy(a))) for a in call.args]
+        bounds = [constant_of(self.visit(copied(a))) for a in call.args]
         if not all(known for known, _ in bounds):
             raise self.refuse(call, "the bounds of static_range must be fixed by the scene")
         return range(*(value for _, value in bounds))
@@ -378,7 +401,7 @@ class Fold(ast.NodeTransformer):
         before = self.known.get(name)
         for value in self.static_values(generator.iter):
             self.known[name] = ast.Constant(value)
-            items.append(self.visit(copy.deepcopy(node.elt)))
+            items.append(self.visit(copied(node.elt)))
         if before is None:
             self.known.pop(name, None)
         else:
