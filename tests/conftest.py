@@ -1,5 +1,6 @@
-"""What several test modules share."""
+"""What several test modules share, and how their tests are dealt to processes."""
 
+import gc
 from collections.abc import Callable
 
 import pytest
@@ -15,3 +16,23 @@ def mpiexec() -> Callable[..., str]:
         return run_ranks(ranks, [str(argument) for argument in arguments], seconds, exit_code)
 
     return run
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Two processes; one where times are measured or there is one GPU for all."""
+    return 0 if config.option.markexpr in ("idle", "gpu") else 2
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of a file stay together; those that start ranks all in one process: they need both cores for themselves."""
+    for item in items:
+        starts_ranks = "mpiexec" in item.fixturenames or hasattr(item.module, "run_ranks")
+        item.add_marker(pytest.mark.xdist_group("ranks" if starts_ranks else item.path.stem))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_stays_out_of_collections():
+    """What numba keeps of each kernel are millions of objects, which every collection of garbage would look at."""
+    yield
+    gc.collect()
+    gc.freeze()

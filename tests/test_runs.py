@@ -70,6 +70,7 @@ def test_plate_impact(tmp_path):
     assert particles["pressure"][shocked].mean() == pytest.approx(reference.pressure, rel=0.02)
 
 
+@pytest.mark.full
 def test_taylors_plate(tmp_path):
     """Half the cells: its largest velocity within 2 %, when it has it within 5 % (0.3 % with all cells); the wave runs
     0.3 m at 1626.2 m/s."""

@@ -37,6 +37,7 @@ def test_an_interface_keeps_its_balance_and_its_width(eos, speed):
     assert np.count_nonzero(mixed) <= 2 * 4
 
 
+@pytest.mark.full
 def test_a_disc_moves_along_the_diagonal():
     """Once around: less than half of the error in shape without sharpening, velocity and pressure uniform."""
     speed, errors = 1000.0, []
