@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time as clock
 from collections.abc import Callable
@@ -32,7 +33,7 @@ from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
 from distfsi.parts.accounts import Accounts
 from distfsi.parts.coupling import Coupling
-from distfsi.parts.cut_cells import CutCells
+from distfsi.parts.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
 from distfsi.parts.fluid import Fluid
 from distfsi.parts.gauges import Gauge, gauge_of
 from distfsi.parts.peaks import Peaks, schlieren
@@ -45,16 +46,17 @@ COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 STEPS_BETWEEN_DEALS = 100
 
 FLUID_LIMIT = "fluid CFL"
+SUB_STEP_SLACK = 1.1  # by how much the solid's limit may fall during its sub-steps
 ATTEMPTS = 8  # at a step, each with half the time step of the one before
 
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
 
-TimeStep = Callable[[], float]
+TimeStep = Callable[[], tuple[float, int]]  # [s], and in how many equal parts a coupled solid takes it
 
 
 def fluid_step(fluid: Fluid, time_step: TimeStep) -> float:
     """Advance the fluid by one step and return it [s]; one that leaves no valid state is redone with half of it."""
-    dt = time_step()
+    dt, _ = time_step()
     for attempt in range(ATTEMPTS):
         if attempt:
             fluid.reject()
@@ -70,7 +72,7 @@ def fluid_step(fluid: Fluid, time_step: TimeStep) -> float:
 def solid_step(solid: Solid, time_step: TimeStep) -> float:
     """Advance the solid by one step and return it [s]."""
     solid.prepare()
-    dt = time_step()
+    dt, _ = time_step()
     solid.advance(dt)  # Eqs. 5-7
     solid.migrate()
     return dt
@@ -78,17 +80,35 @@ def solid_step(solid: Solid, time_step: TimeStep) -> float:
 
 def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: TimeStep) -> float:
     """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
-    solid.prepare(coupling.reach)
-    dt = time_step()
-    solid.advance(dt)  # Eqs. 5-7
+    solid.prepare(coupling.reach, coupling.stray)
+    dt = sub_cycle(solid, coupling, *time_step())  # Eqs. 5-7
     coupling.follow()
     for stage in fluid.stages:
         coupling.before_stage(stage)
         fluid.advance_stage(stage, dt)
         coupling.after_stage(stage, dt)
-    gain = solid.push(coupling.impulse())  # Eq. 34
-    coupling.book_work(gain)
+    excess = solid.push(coupling.impulse())  # Eq. 34
+    coupling.book_work(excess)
     solid.migrate()
+    return dt
+
+
+def sub_cycle(solid: Solid, coupling: Coupling, dt: float, parts: int) -> float:
+    """Advance the solid by `dt` [s] in equal parts, with no force of the fluid meanwhile; how far it came [s].
+
+    That is less when its own limit has fallen below a part, or when another part would take it too far.
+    """
+    part, way = dt / parts, 0.0
+    for done in range(parts):
+        if done:
+            solid.prepare(coupling.reach, coupling.stray, goes_on=True)
+        if parts > 1:
+            rates = np.array([1.0 / solid.time_step()[0], 1.0 / coupling.time_step()])
+            solid_rate, wall_rate = part * solid.communicator.maximum(rates)
+            if done and not (solid_rate < SUB_STEP_SLACK and way + wall_rate < FARTHEST_MOVE / LARGEST_MOVE):
+                return done * part
+            way += wall_rate
+        solid.advance(part)
     return dt
 
 
@@ -98,6 +118,8 @@ class Simulation:
 
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
+    sub_steps    that the solid was to make in the last step
+    solid_limit  rate [1/s] of the shortest step that a particle of this rank needs, and why
     signals   of this rank's blocks of fluid [1/s] before the last step
     asked     what this rank is asked for; looked at once in every step
     request   the strongest of what all ranks were asked for in the last step: the same on all of them
@@ -114,6 +136,8 @@ class Simulation:
     steps: int = 0
     dt: float = 0.0
     limited_by: str = "start"
+    sub_steps: int = 1
+    solid_limit: tuple[float, str] = (0.0, "")
     signals: np.ndarray | None = None
     asked: Callable[[], Request] = lambda: Request.NOTHING
     request: Request = Request.NOTHING
@@ -164,6 +188,8 @@ class Simulation:
             raise Diverged(faults[0] + (NOT_REDONE if self.coupling else "")) from error
         if self.rejected_steps > rejected:
             self.limited_by = "rejected step"
+        if self.coupling and self.solid.sub_steps < self.sub_steps:
+            self.limited_by = "sub-steps of the solid"
         self.time += self.dt
         self.steps += 1
         self.watch()
@@ -178,31 +204,37 @@ class Simulation:
         for watcher in self.watchers:
             watcher.after_step(self)
 
-    def time_step(self) -> float:
-        """The longest stable step [s] of all parts on all ranks. Raises Diverged when a part has no valid state."""
+    def time_step(self) -> tuple[float, int]:
+        """The longest stable step [s] of all parts on all ranks, and in how many parts the solid takes it. Raises
+        Diverged when a part has no valid state."""
         signal = self.fluid.fastest_signal() if self.fluid else 0.0
         self.signals = self.fluid.signals.copy() if self.fluid else None
         solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
         wall_dt = self.coupling.time_step() if self.coupling else np.inf
+        self.solid_limit = 1.0 / solid_dt, solid_reason
         rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, 1.0 / wall_dt, self.asked()])
         fluid_rate, solid_rate, wall_rate, request = self.communicator.maximum(rates)
         self.request = Request(int(request))
         if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
             raise Diverged("there is no stable time step")
-        if solid_rate > max(fluid_rate, wall_rate):
-            holder = [
-                reason for rate, reason in self.communicator.allgather((rates[1], solid_reason)) if rate == solid_rate
-            ]
-            self.limited_by = holder[0]
+        parts = self.coupling.sub_steps if self.coupling else 1
+        if solid_rate / parts > max(fluid_rate, wall_rate):
+            self.limited_by = self.name_solid_limit()
         else:
             named = self.limited_by.startswith(FLUID_LIMIT)
             limit = self.limited_by if named else FLUID_LIMIT
             self.limited_by = limit if fluid_rate >= wall_rate else "wall speed"
-        dt = 1.0 / max(fluid_rate, solid_rate, wall_rate)
+        dt = 1.0 / max(fluid_rate, solid_rate / parts, wall_rate)
         left = self.scene.time.end - self.time
         if dt >= left:
             self.limited_by = "end time"
-        return min(dt, left)
+        dt = min(dt, left)
+        self.sub_steps = max(1, math.ceil(dt * solid_rate * (1.0 - 1e-12)))
+        return dt, self.sub_steps
+
+    def name_solid_limit(self) -> str:
+        """Collective. What bounds the solid's steps."""
+        return max(self.communicator.allgather(self.solid_limit), key=lambda limit: limit[0])[1]
 
     def name_limit(self) -> str:
         """Collective. What set the last time step; if the fluid did, where it was fastest and how fast. Progress tells

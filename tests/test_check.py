@@ -12,7 +12,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.scene.advice import advice
 from distfsi.scene.description import IdealGas, Jwl, StiffenedGas
-from distfsi.scene.signals import Layout, moving_share, steps
+from distfsi.scene.signals import Layout, moving_share, steps, sub_steps
 from distfsi.scene.waves import Side, meet
 from distfsi.simulation import Simulation, deal_blocks, run
 from distfsi.study import bench
@@ -231,7 +231,8 @@ def test_the_time_is_start_and_steps_and_files():
     moving, neighbours = moving_share(tube.scene, tube.layout), (tube.scene.solid.smoothing / 1.3) ** 2
     per_cell, per_particle = np.linalg.solve([[10, 1000], [100, 100]], [1e-3, 1e-3])
     wall = tube.band_cells * per_cell + tube.particles * per_particle
-    coupled = 1e-3 + moving * 3 * tube.cells / 6e6 + tube.particles * neighbours * 1e-6 + wall + tube.cells * 1e-8
+    solid = sub_steps(tube.scene, tube.layout) * tube.particles * neighbours * 1e-6
+    coupled = 1e-3 + moving * 3 * tube.cells / 6e6 + solid + wall + tube.cells * 1e-8
     assert seconds(TUBE, 1, 1) == pytest.approx(coupled)
     assert seconds(bubble, 1, 1, "time.maximum_steps=10", whole) < 0.5 * one  # most of the air is still at rest
     assert "on 2 rank(s) of 1 thread(s), by the bench of this machine" in report(tube.scene, 2, 1, RATES)

@@ -123,12 +123,12 @@ def spread_impulse(begin, end, band, volume, impulse, inertia, kick, shape):
 
 
 @driver
-def find_debts(begin, end, band, debt, impulse, gain):
-    """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity
-    before: half of it times the `gain` (n, D) [m/s] of the particles that it sees."""
+def find_debts(begin, end, band, debt, impulse, excess):
+    """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity of
+    the wall: the impulse times the `excess` (n, D) [m/s] of the particles that it sees."""
     for n in range(begin, end):
         J = tuple(impulse[n, d] for d in static_range(DIMENSIONS))
-        store(debt, band[n], 0.5 * dot(J, tuple(gain[n, d] for d in static_range(DIMENSIONS))))
+        store(debt, band[n], dot(J, tuple(excess[n, d] for d in static_range(DIMENSIONS))))
 
 
 @driver

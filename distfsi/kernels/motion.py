@@ -41,9 +41,10 @@ def kick(begin, end, dt, mass, fixed, acceleration, velocity, booked):
 
 
 @driver
-def push(begin, end, impulse, mass, fixed, velocity, gain, booked):
-    """velocity[i] grows by the gain from the fluid's impulse; that of a fixed particle does not.
+def push(begin, end, impulse, mass, fixed, mean, velocity, excess, booked):
+    """velocity[i] grows by what the fluid's impulse gives; that of a fixed particle does not.
 
+    excess[i] = velocity at which the impulse works beyond the `mean` one with which the particle moved;
     booked (n, 2 + D): work of the impulse, work of what holds the fixed particles; their impulse.
     """
     for i in range(begin, end):
@@ -55,10 +56,18 @@ def push(begin, end, impulse, mass, fixed, velocity, gain, booked):
             work += given * (before + 0.5 * gained)
             held_work += held * before
             booked[i, 2 + d] = held
-            gain[i, d] = gained
+            excess[i, d] = before - mean[i, d] + 0.5 * gained
             velocity[i, d] = before + gained
         booked[i, 0] = work
         booked[i, 1] = held_work
+
+
+@driver
+def average(begin, end, count, velocity, mean):
+    """mean[i] of the last `count` velocities, when `velocity` is the newest."""
+    for i in range(begin, end):
+        for d in static_range(DIMENSIONS):
+            mean[i, d] += (velocity[i, d] - mean[i, d]) / count
 
 
 @driver

@@ -40,6 +40,7 @@ class Accounts:
                 *(["solid pieces"] if "piece" in solid.columns else []),
             ]
         if coupling:
+            self.columns += ["sub-steps", "sub-steps limited by"]
             self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
@@ -80,6 +81,8 @@ class Accounts:
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
         book("left", left)
         if self.coupling:
+            parts = self.solid.sub_steps
+            values |= {"sub-steps": parts, "sub-steps limited by": simulation.name_solid_limit() if parts > 1 else ""}
             for cause, amounts in self.coupling.ledger().items():
                 book(f"ledger {cause}", amounts, -1.0)
         if np.isnan(self._start).all():

@@ -41,11 +41,13 @@ class Coupling:
     """What the solid covers of the fluid's grid, the state of the covered cells, and the forces across the wall.
 
     reach   [m]: how far the solid's ghosts and images must go
+    sub_steps, stray  the most sub-steps of the solid, and how far its particles may go in them [m]: there are none
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid loses there),
             "covered" and "fresh" cells, "sides" (what the fluid counts as having left the domain at covered cells)
     """
 
     causes = ("wall", "covered", "fresh", "sides")
+    sub_steps, stray = 1, 0.0
 
     def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
@@ -186,8 +188,8 @@ class Coupling:
         self._ledger["wall"][:, P : P + D] += self._per_block(home, impulse)
         return impulse
 
-    def book_work(self, gain: np.ndarray) -> None:
-        """Enter the work of the impulse on the solid, after solid.push() gave particles `gain` (own, D) [m/s]."""
+    def book_work(self, excess: np.ndarray) -> None:
+        """Enter the work of the impulse on the solid, after solid.push()."""
         self._ledger["wall"][:, -1] += self.solid.work
 
     # ---- parts of it ------------------------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ from distfsi.scene.description import Scene
 
 MIRRORS = ("symmetry", "wall", "outflow", "inflow")
 LARGEST_MOVE = 0.45  # of a cell in a step, before the forces between particles change its speed
+FARTHEST_MOVE = 0.5  # of a cell, whatever they do: then the solid makes no other sub-step
 PARTICLE_DRIVERS = (
     *EXCHANGE,
     *row_kernels.REDUCTIONS,
@@ -62,6 +63,7 @@ class CutCells:
     """Conservative coupling: the wall cuts cells, and fluid neither is made nor passes through bodies.
 
     reach   [m]: how far the solid's ghosts must go for its own sake: not at all
+    sub_steps, stray  the most sub-steps of the solid in a step, and how far its particles may go in them [m]
     kind    field (local blocks, 1, Z, Y, X) on host and device: COVERED where a cell holds no fluid
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
             an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
@@ -83,6 +85,8 @@ class CutCells:
         self._particles = ParticleExchange(blocks, team, self.kernels)
         self._points = WallPoints(self._particles.rows, self.kernels, max(grid.spacing[: grid.dimensions]))
         self._spacing = np.array(grid.spacing)
+        self.sub_steps = scene.coupling.sub_steps
+        self.stray = FARTHEST_MOVE * float(self._spacing[: self._dimensions].min())
         self._corners = [team.array(np.array(corner)) for corner in (grid.lower, grid.upper)]
         self._homes = [team.array(np.array(values)) for values in (blocks.block_cells, blocks.curve_index)]
         self._cell_volume = float(self._spacing.prod())
@@ -155,7 +159,7 @@ class CutCells:
     def follow(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         team, D = self.team, self._dimensions
-        self._cut(self.solid.start, *self.solid.columns.read("velocity"))
+        self._cut(self.solid.start, self.solid.carried)
         self._find_company()
         n = self._band.shape[0]
         self._area, self._velocity = (team.empty((n, D)) for _ in range(2))
@@ -222,10 +226,11 @@ class CutCells:
         self._run(self.kernels.clear, D, self._kick.reshape(-1), wall.shape)
         return given
 
-    def book_work(self, gain: Any) -> None:
-        """Collective, after solid.push(), which gave particles `gain` (own, D) [m/s]: the fluid pays for it."""
+    def book_work(self, excess: Any) -> None:
+        """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
+        wall: the fluid pays for it."""
         D, P, wall = self._dimensions, self.model.phases, self.wall
-        (velocity,) = self._plan.exchange([(gain, tuple((a,) for a in range(D)))])
+        (velocity,) = self._plan.exchange([(excess, tuple((a,) for a in range(D)))])
         mean, paid = self.team.empty(self._velocity.shape), self.team.empty(self._band.shape)
         self._see(velocity, mean)
         debt = self._debt.reshape(-1)

@@ -40,6 +40,7 @@ DRIVERS = (
     motion.collect_state,
     motion.kick,
     motion.push,
+    motion.average,
     motion.move,
     material.deform,
     *updated.DRIVERS,
@@ -50,13 +51,16 @@ LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_li
 
 
 class Solid:
-    """All particles of this rank. A step is prepare(), time_step(), advance(dt, impulse), migrate().
+    """All particles of this rank. A step is prepare(), time_step(), advance(dt), push(impulse), migrate(); of these a
+    sub-step is the first three.
 
     columns  this rank's particles on host and device, sorted by (block, id): id, body, fixed (n,), position [m],
              velocity [m/s] (n, D), mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the
              materials remember (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s],
              damage (n,) … Velocities belong to half a step before the positions.
-    start    (own, D) [m] positions as of prepare(), on the device
+    start    (own, D) [m] positions when the step began, on the device
+    carried  (own, D) [m/s] mean velocity since then, on the device
+    sub_steps  that have been made since then
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
@@ -90,6 +94,7 @@ class Solid:
         self.work = np.zeros(blocks.local_count)
         self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
         self._home: Pair | None = None
+        self.sub_steps = 0
         self._own_particles(scene)
 
     def _own_particles(self, scene: Scene) -> None:
@@ -122,11 +127,12 @@ class Solid:
 
     # ---- the step ---------------------------------------------------------------------------------------------------
 
-    def prepare(self, reach: float = 0.0) -> None:
+    def prepare(self, reach: float = 0.0, stray: float = 0.0, goes_on: bool = False) -> None:
         """Collective. Bring in ghosts and images, find neighbours, and compute the forces between particles.
 
-        `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. Raises Diverged on all
-        ranks when a smoothing length is not finite.
+        `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. `goes_on`: a step that
+        has begun goes on with another sub-step; `stray` [m]: how far particles go between two calls of migrate(), if
+        there are such. Raises Diverged on all ranks when a smoothing length is not finite.
         """
         c, device, own = self.columns, self.team, self.count
         largest = self.exchange.rows.largest(*c.read("h"), 0.0)
@@ -136,9 +142,12 @@ class Solid:
             raise Diverged("solid: a smoothing length is not finite")
         state, parity = device.empty((own, kernels.VELOCITY + self.dimensions)), ((),) * kernels.VELOCITY
         device.run(self.kernels.collect_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
-        (self.start,) = c.read("position")
-        plan = self.exchange.ghosts(self.start, c["id"], max(reach, support), self.form.asked(c))
-        given = [(self.start, "position"), (state, parity + self._vector), *self.form.told(c)]
+        (here,) = c.read("position")
+        if not goes_on:
+            self.start, self.carried, self.sub_steps = here, device.zeros((own, self.dimensions)), 0
+        reach = max(reach, support)
+        plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.asked(c), image_reach=reach)
+        given = [(here, "position"), (state, parity + self._vector), *self.form.told(c)]
         position, state, *told = plan.exchange(given)
         self._near = Near(plan, position, state, support, told, flags)
         self._acceleration = device.zeros((own, self.dimensions))
@@ -182,20 +191,24 @@ class Solid:
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
         c.adopt("position", moved)
+        self.sub_steps += 1
+        self._run(self.kernels.average, self.sub_steps, velocity, self.carried)
 
     def push(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
 
-        Returns the gain (own, D) of velocity [m/s], another one; there is none where particles are fixed.
+        Returns by how much (own, D) [m/s], another one, the velocity at which the impulse works on each particle, the
+        mean of before and after, exceeds the one that carried it.
         """
         c, device, D = self.columns, self.team, self.dimensions
-        gain, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
-        self._run(self.kernels.push, impulse, *c.read("mass", "fixed"), *c.write("velocity"), gain, booked)
+        excess, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
+        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, booked)
+        self._run(self.kernels.push, impulse, *given)
         books = self._per_body(booked).sum(axis=1)
         self.work, self.given = books[:, 0], self._per_body(impulse)
         self._gravity_work += books[:, 1]
         self._boundary_impulse += books[:, 2:]
-        return gain
+        return excess
 
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""

@@ -450,9 +450,10 @@ Gauge = PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge
 
 @dataclass(frozen=True)
 class Coupling:
-    """How fluid and solid meet."""
+    """How fluid and solid meet; the solid makes up to so many `sub_steps` in a step of the fluid."""
 
     scheme: CouplingScheme = "cut_cells"
+    sub_steps: int = 8
 
 
 @dataclass(frozen=True)

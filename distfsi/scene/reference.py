@@ -52,6 +52,7 @@ SECTIONS = {
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
     "`[gauges.NAME]`": ("PointGauge", "LineGauge", "PlaneGauge", "ParticleGauge", "BodyGauge"),
+    "`[coupling]`": ("CouplingInput",),
     "`[performance]`": ("PerformanceInput",),
 }
 TABLE_HEAD = ["| key | value | default | meaning |", "|---|---|---|---|"]

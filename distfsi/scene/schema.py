@@ -270,6 +270,11 @@ class CouplingInput(Table):
         "cut_cells",
         description='"cut_cells": conservative, tight and quiet; "paper": covered cells copy the fluid',
     )
+    sub_steps: Annotated[int, Field(strict=True, ge=1)] = Field(
+        8,
+        description="most steps that the solid makes within one of the fluid, where its own must be shorter; "
+        '1 with "paper"',
+    )
 
 
 class PerformanceInput(Table):

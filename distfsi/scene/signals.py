@@ -166,10 +166,21 @@ def end_time(scene: Scene, layout: Layout | None) -> float:
     return scene.time.end if limit is None else min(scene.time.end, limit / _step_rate(scene, layout))
 
 
+def sub_steps(scene: Scene, layout: Layout | None) -> float:
+    """How many steps the solid makes in one of the run, as a mean."""
+    return max(_solid_rate(scene) / _step_rate(scene, layout), 1.0)
+
+
 def _step_rate(scene: Scene, layout: Layout | None) -> float:
     """1/dt [1/s]."""
     rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
-    return max(rate, *(solid_rate(scene, body) for body in scene.solid.bodies)) if scene.solid else rate
+    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme == "cut_cells" else 1
+    return max(rate, _solid_rate(scene) / parts)
+
+
+def _solid_rate(scene: Scene) -> float:
+    """1/dt [1/s] of the body that needs the shortest steps; 0 without one."""
+    return max((solid_rate(scene, body) for body in scene.solid.bodies), default=0.0) if scene.solid else 0.0
 
 
 def fluid_rate(scene: Scene, layout: Layout) -> float:

@@ -14,7 +14,7 @@ from distfsi.model import fluid_model
 from distfsi.parts.fluid import SSP_RK3
 from distfsi.scene.description import IdealGas, Scene, StiffenedGas
 from distfsi.scene.packing import pack
-from distfsi.scene.signals import Layout, end_time, moving_share, steps
+from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_steps
 from distfsi.simulation import deal_blocks
 from distfsi.study.works import SMOOTHING
 
@@ -162,8 +162,8 @@ class Resources:
         share = threads_of_bench / min(self.ranks * threads, max(1, self._pieces()))
         smallest = "coupled" if self.cells and self.particles else "fluid" if self.cells else "solid"
         fixed = bench[f"smallest_{smallest}"]
-        work = moving * self.cells * self._seconds_per_cell(bench) + self.particles * self._seconds_per_particle(bench)
-        work += self._seconds_at_wall(bench)
+        work = moving * self.cells * self._seconds_per_cell(bench) + self._seconds_at_wall(bench)
+        work += sub_steps(self.scene, self.layout) * self.particles * self._seconds_per_particle(bench)
         files = self.output_times() * (SECONDS_PER_FILE + self.output_bytes() / BYTES_PER_SECOND)
         bubble = bench["shock_bubble_2d"]
         row = fixed["history_row_seconds"] + share * self.cells * bubble["history_row_seconds"] / bubble["cells"]
