@@ -116,6 +116,8 @@ def sub_cycle(solid: Solid, coupling: Coupling, dt: float, parts: int) -> float:
 class Simulation:
     """The parts of a scene on this rank, and the step that advances them.
 
+    loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
+              was dropped, and the solid goes on alone
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
     sub_steps    that the solid was to make in the last step
@@ -136,6 +138,8 @@ class Simulation:
     steps: int = 0
     dt: float = 0.0
     limited_by: str = "start"
+    loaded: bool = False
+    alone: bool = False
     sub_steps: int = 1
     solid_limit: tuple[float, str] = (0.0, "")
     signals: np.ndarray | None = None
@@ -175,8 +179,8 @@ class Simulation:
 
     def step(self) -> None:
         """Advance everything by one step."""
-        parts = self.parts
-        step = coupled_step if self.coupling else fluid_step if self.fluid else solid_step
+        parts = [self.solid] if self.alone else self.parts
+        step = coupled_step if self.coupled else fluid_step if self.flows else solid_step
         rejected = self.rejected_steps
         try:
             self.dt = step(*parts, self.time_step)
@@ -188,11 +192,32 @@ class Simulation:
             raise Diverged(faults[0] + (NOT_REDONE if self.coupling else "")) from error
         if self.rejected_steps > rejected:
             self.limited_by = "rejected step"
-        if self.coupling and self.solid.sub_steps < self.sub_steps:
+        if self.coupled and self.solid.sub_steps < self.sub_steps:
             self.limited_by = "sub-steps of the solid"
         self.time += self.dt
         self.steps += 1
         self.watch()
+        if self.coupled and self.scene.coupling.drop_below is not None:
+            self._end_loads(self.scene.coupling.drop_below)
+
+    @property
+    def flows(self) -> bool:
+        """Whether there is a fluid that is computed."""
+        return self.fluid is not None and not self.alone
+
+    @property
+    def coupled(self) -> bool:
+        """Whether fluid and solid act on each other."""
+        return self.coupling is not None and not self.alone
+
+    def _end_loads(self, least: float) -> None:
+        """Collective. Drop the fluid when it pressed on the solid by `least` [Pa] and does no more."""
+        pressure = self.coupling.pressure(self.dt)
+        self.loaded = self.loaded or pressure >= least
+        if self.loaded and pressure < least:
+            self.alone = True
+            self.coupling.let_fluid_leave()
+            self.solid.given[:] = 0.0
 
     @property
     def rejected_steps(self) -> int:
@@ -207,17 +232,17 @@ class Simulation:
     def time_step(self) -> tuple[float, int]:
         """The longest stable step [s] of all parts on all ranks, and in how many parts the solid takes it. Raises
         Diverged when a part has no valid state."""
-        signal = self.fluid.fastest_signal() if self.fluid else 0.0
-        self.signals = self.fluid.signals.copy() if self.fluid else None
+        signal = self.fluid.fastest_signal() if self.flows else 0.0
+        self.signals = self.fluid.signals.copy() if self.flows else None
         solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
-        wall_dt = self.coupling.time_step() if self.coupling else np.inf
+        wall_dt = self.coupling.time_step() if self.coupled else np.inf
         self.solid_limit = 1.0 / solid_dt, solid_reason
         rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, 1.0 / wall_dt, self.asked()])
         fluid_rate, solid_rate, wall_rate, request = self.communicator.maximum(rates)
         self.request = Request(int(request))
         if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
             raise Diverged("there is no stable time step")
-        parts = self.coupling.sub_steps if self.coupling else 1
+        parts = self.coupling.sub_steps if self.coupled else 1
         if solid_rate / parts > max(fluid_rate, wall_rate):
             self.limited_by = self.name_solid_limit()
         else:
@@ -274,11 +299,14 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """What a restart needs besides the parts."""
-        return {"values": {"time": np.array(self.time), "steps": np.array(self.steps)}}
+        names = ("time", "steps", "loaded", "alone")
+        return {"values": {name: np.array(getattr(self, name)) for name in names}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.time, self.steps = float(snapshot["values"]["time"]), int(snapshot["values"]["steps"])
+        values = snapshot["values"]
+        self.time, self.steps = float(values["time"]), int(values["steps"])
+        self.loaded, self.alone = bool(values["loaded"]), bool(values["alone"])
 
     @property
     def done(self) -> bool:
@@ -402,6 +430,7 @@ def advance(
     """
     balance = Balance(simulation.parts, simulation.blocks)
     while not simulation.done:
+        alone = simulation.alone
         try:
             simulation.step()
             saving = simulation.request is not Request.NOTHING and not simulation.done
@@ -412,6 +441,10 @@ def advance(
             if simulation.is_valid():
                 records.write_restart({name: part.snapshot() for name, part in kept.items()})
             raise Diverged(f"{error}\n{records.left_behind()}") from error
+        if simulation.alone > alone:
+            when = f"t = {simulation.time:.6g} s, after {simulation.steps} steps"
+            why = f"its pressure on the solid is below {simulation.scene.coupling.drop_below:g} Pa everywhere"
+            progress.say(f"the fluid is dropped at {when}: {why} (coupling.drop_below); the solid goes on alone")
         records.write(always=simulation.done)
         progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)
         if saving:

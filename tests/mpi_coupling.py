@@ -52,7 +52,7 @@ class Coupled:
 
     def __init__(
         self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64",
-        scheme="paper", cfl=0.4, runge_kutta="rk3", form="updated_lagrangian",
+        scheme="paper", cfl=0.4, runge_kutta="rk3", form="updated_lagrangian", drop_below=None,
     ):  # fmt: skip
         D = len(lower)
         kinds = kinds or (("wall", "wall"),) * D
@@ -66,7 +66,7 @@ class Coupled:
             solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form=form),
             output=d.Output("", 0.0, 1),
             performance=d.Performance((block,) * D, (block,) * D),
-            coupling=d.Coupling(scheme),
+            coupling=d.Coupling(scheme, drop_below=drop_below),
         )
         self.communicator = Communicator()
         self.simulation = Simulation.of(scene, self.communicator, threads)

@@ -123,6 +123,15 @@ def spread_impulse(begin, end, band, volume, impulse, inertia, kick, shape):
 
 
 @driver
+def find_pressures(begin, end, band, area, impulse, pressure):
+    """pressure[n] [Pa s] that a cell's impulse (n, D) [N s/m3] makes on the area (n, D) [1/m] of its wall, or 0."""
+    for n in range(begin, end):
+        A = tuple(area[n, d] for d in static_range(DIMENSIONS))
+        J = tuple(impulse[n, d] for d in static_range(DIMENSIONS))
+        pressure[n] = sqrt(dot(J, J) / dot(A, A)) if has_wall(area, n) else 0.0
+
+
+@driver
 def find_debts(begin, end, band, debt, impulse, excess):
     """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity of
     the wall: the impulse times the `excess` (n, D) [m/s] of the particles that it sees."""

@@ -47,6 +47,13 @@ class Progress:
         ]
         self._show("  ".join(part for part in parts if part), time)
 
+    def say(self, message: str) -> None:
+        """Print `message`; the run goes on."""
+        if self._bar:
+            self._bar.console.print(message, markup=False)
+        elif self._shown:
+            print(message, flush=True)
+
     def finish(self, message: str) -> None:
         """Take the bar away and print `message`."""
         self.close()

@@ -24,7 +24,7 @@ from distfsi.errors import InputError
 from distfsi.output.interfaces import Blocks, Communicator
 from distfsi.output.storage import Piece, Storage, create_dataset, on_root, write_complete
 
-FORMAT = 1
+FORMAT = 2
 KEPT = 2  # restart files in an output directory
 # What may change at a restart: as it likes, or so that the user is told.
 FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit")

@@ -38,6 +38,7 @@ PARTICLE_DRIVERS = (
     cut_forces.mark_stretched,
     cut_forces.find_momentum,
     cut_forces.see_particles,
+    cut_forces.find_pressures,
     cut_forces.find_debts,
     cut_forces.clear,
     immersed_kernels.push,
@@ -122,10 +123,10 @@ class CutCells:
         for block in range(self.blocks.local_count):
             (x, y, z), middles = (a.T for a in self.wall.cut_cells(block))
             state[block][:, z, y, x] = self._initial.at(middles.T)
-        kind[:] = np.where(swept[:, :1] > 0.0, immersed_kernels.FLUID, immersed_kernels.COVERED)
+        self._classify()
         swept[:, 1:] = 0.0
         np.moveaxis(state, 1, -1)[kind[:, 0] == immersed_kernels.COVERED] = self._rest
-        for changed in (self.swept, self.kind, self.fluid):
+        for changed in (self.swept, self.fluid):
             changed.changed()
         self._exchange_swept()
 
@@ -244,6 +245,26 @@ class CutCells:
         impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self._impulse, self._work, paid))
         self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse
         self._wall_sums[:, -1] += self.solid.work - work[:, 0] - extra[:, 0]
+
+    def pressure(self, dt: float) -> float:
+        """Collective. The highest mean pressure [Pa] on a cell's wall in the last step, of `dt` [s]."""
+        pressure = self.team.empty(self._band.shape[0])
+        self._run(self.kernels.find_pressures, self._area, self._impulse, pressure)
+        highest = self._particles.rows.largest(pressure, 0.0) / dt
+        return float(self.blocks.communicator.maximum(np.array([highest]))[0])
+
+    def let_fluid_leave(self) -> None:
+        """All that the fluid holds leaves the domain; from now on no cell has any."""
+        self.fluid.leave(self.volume)
+        self.swept.here()[:] = 0.0
+        self.swept.changed()
+        self._classify()
+
+    def _classify(self) -> None:
+        """Which cells are covered, by what they hold."""
+        holds = self.swept.here()[:, :1] > 0.0
+        self.kind.here()[:] = np.where(holds, immersed_kernels.FLUID, immersed_kernels.COVERED)
+        self.kind.changed()
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
@@ -391,6 +412,7 @@ class CutCells:
         """Collective. Go on from a snapshot, after the solid has."""
         self.blocks.without_ghosts(self.swept.here()[:, :1])[:] = snapshot["cells"]["swept"]
         self.swept.changed()
+        self._classify()
         self._exchange_swept()
         self._wall_sums[:] = snapshot["sums"]["wall"]
         self._through_sides.here()[:] = snapshot["sums"]["sides"]

@@ -302,6 +302,12 @@ class Fluid:
 
         volume (local blocks, Z, Y, X): the part of each cell that fluid fills, by default all.
         """
+        sums = self._contents(volume)
+        totals = self.blocks.sum(sums.reshape(len(sums), 2 * self.model.conserved))
+        return totals[: self.model.conserved], totals[self.model.conserved :]
+
+    def _contents(self, volume: np.ndarray | None) -> np.ndarray:
+        """Of each block (local blocks, 2, conserved) what totals() are of all."""
         sums = np.zeros((self.blocks.local_count, 2, self.model.conserved))
         for block in range(self.blocks.local_count):
             cells = self.cells(block)[: self.model.conserved].astype(np.float64)
@@ -309,9 +315,13 @@ class Fluid:
                 part = self.active(volume, block).astype(np.float64)
                 cells = np.where(part > 0.0, part * cells, 0.0)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
-        sums *= self._cell_volume()
-        totals = self.blocks.sum(sums.reshape(len(sums), 2 * self.model.conserved))
-        return totals[: self.model.conserved], totals[self.model.conserved :]
+        return sums * self._cell_volume()
+
+    def leave(self, volume: np.ndarray) -> None:
+        """Book all that the cells hold in this `volume` (local blocks, Z, Y, X) as having left the domain."""
+        _, first = np.unique(self.tiles[:, kernels.BLOCK], return_index=True)
+        self._through.here()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
+        self._through.changed()
 
     def left_domain(self) -> np.ndarray:
         """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""

@@ -153,7 +153,7 @@ def _gauge(name: str, given: GaugeInput, end: float, bodies: Sequence[str]) -> G
 
 def build_coupling(given: CouplingInput) -> Coupling:
     """The scheme between fluid and solid."""
-    return Coupling(given.scheme, given.sub_steps)
+    return Coupling(given.scheme, given.sub_steps, given.drop_below)
 
 
 def build_performance(given: PerformanceInput, dimensions: int) -> Performance:

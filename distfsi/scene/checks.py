@@ -30,6 +30,7 @@ from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     BodyGauge,
+    CouplingInput,
     DomainInput,
     FluidInput,
     GaugeInput,
@@ -73,7 +74,7 @@ def check(
     if solid is not None:
         yield from check_solid(solid, domain)
         if fluid is not None:
-            yield from check_coupling(solid, domain, fluid)
+            yield from check_coupling(sections.coupling, solid, domain, fluid)
 
 
 def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
@@ -227,8 +228,10 @@ def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) ->
     return gap.min() < CLOSEST_BODIES * 0.5 * (a.spacing + b.spacing)
 
 
-def check_coupling(solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
+def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
     """Bodies in a fluid are tight, and faces look no farther than to the next cells."""
+    if given.drop_below is not None and given.scheme == "paper":
+        yield Fault(("coupling", "drop_below"), "needs scheme 'cut_cells'")
     if fluid.reconstruction == "weno5":
         yield Fault(("fluid", "reconstruction"), "'weno5' looks past the cells beside a solid; expected another")
     coarsest = COARSEST_SPACING * min(domain.spacing)

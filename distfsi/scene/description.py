@@ -450,10 +450,14 @@ Gauge = PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge
 
 @dataclass(frozen=True)
 class Coupling:
-    """How fluid and solid meet; the solid makes up to so many `sub_steps` in a step of the fluid."""
+    """How fluid and solid meet; the solid makes up to so many `sub_steps` in a step of the fluid.
+
+    drop_below: the fluid is dropped when its pressure on the solid has nowhere reached this [Pa] any more; None: never.
+    """
 
     scheme: CouplingScheme = "cut_cells"
     sub_steps: int = 8
+    drop_below: float | None = None
 
 
 @dataclass(frozen=True)

@@ -275,6 +275,11 @@ class CouplingInput(Table):
         description="most steps that the solid makes within one of the fluid, where its own must be shorter; "
         '1 with "paper"',
     )
+    drop_below: quantity("Pa", gt=0.0) | None = Field(
+        None,
+        description="when the pressure on the solid, once it has been higher, is below this everywhere, the fluid is "
+        "dropped and the solid goes on alone; default: never",
+    )
 
 
 class PerformanceInput(Table):
