@@ -312,6 +312,49 @@ def test_a_spinning_disc_that_bursts_keeps_its_angular_momentum():
     assert np.all(c["density"] > 950.0)
 
 
+def failed_block(eos):
+    """A block of metal without any stress that has failed everywhere."""
+    failure = JohnsonCookFailure(0.1, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, None)
+    block = body(Box((-0.02, -0.02), (0.02, 0.02)), 2.5e-3, 8930.0, (0.0, 0.0), eos, NoStrength(), failure=failure)
+    part = total_lagrangian([block], (-0.1, -0.1), (0.1, 0.1))
+    part.columns["damage"] = np.ones(len(part.columns["id"]))
+    return part
+
+
+def test_hot_debris_swells_until_it_has_no_pressure():
+    """It gains no more motion than its thermal pressure gives on the way: (gamma e)^2 / 2 c^2 per mass."""
+    part = failed_block(COPPER_EOS)
+    c, hot = part.columns, 5e4
+    c["energy"] = np.full(len(c["id"]), hot)
+    c["velocity"] = 1e3 * c["position"]
+    before, whole = part.totals(), energy(part)
+    for _ in range(60):
+        step(part)
+    c, after = part.columns, part.totals()
+    most = before["mass"] * 0.5 * (2.0 * hot / 3940.0) ** 2
+    assert (c["bond_count"] == 0).all()
+    assert 0.8 * most < after["kinetic"] - before["kinetic"] < 1.05 * most
+    assert np.abs(c["pressure"]).max() < 1.0
+    assert c["density"].max() < 8930.0 * (1.0 - 0.9 * 2.0 * hot / 3940.0**2)
+    assert energy(part) == pytest.approx(whole, rel=1e-12)
+
+
+def test_a_spring_that_was_never_pressed_does_not_push():
+    """Bonds that are cut while they are short leave no force behind; what comes closer afterwards is pushed back."""
+    part = failed_block(COPPER_EOS)
+    c = part.columns
+    c["position"][:, 1] *= 0.3
+    c["around"] = np.ones(len(c["id"]))
+    c["loose"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
+    for _ in range(2):
+        part.prepare()
+    assert 0 < (c["bond_count"] == 0).sum() < len(c["id"])
+    assert np.abs(part._acceleration).max() == 0.0
+    c["position"][:, 1] *= 0.99
+    part.prepare()
+    assert np.abs(part._acceleration).max() > 0.0
+
+
 def test_rubber_rings_meet_part_and_do_not_break():
     speed, spacing = 0.059 * 57.03, 0.0025
     rings = [

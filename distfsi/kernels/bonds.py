@@ -8,7 +8,7 @@ weight w of physics/bonds.py, `partner[i]` the partner's row among a rank's own 
 from math import log, sqrt
 
 from distfsi.device.markers import driver, helper
-from distfsi.kernels.material import matrix_of
+from distfsi.kernels.material import EOS_CONSTANTS, matrix_of
 from distfsi.kernels.solid import difference, no_matrix, plus, store_matrix
 from distfsi.physics.bonds import (
     LEAST_GROWTH,
@@ -23,12 +23,15 @@ from distfsi.physics.bonds import (
 )
 from distfsi.physics.pair import gradient_correction
 from distfsi.physics.smoothing import smoothing_slope
+from distfsi.physics.solid_eos import free_swelling
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
 from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, scaled, times, trace
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
-VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, CRACK = range(7)  # columns of `facts`: what ghosts are told besides
+VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, CRACK = range(
+    8
+)  # columns of `facts`: what ghosts are told besides
 SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
 
@@ -175,10 +178,11 @@ def crack(
 
 
 @driver
-def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, partner, bond, lost):
+def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, partner, bond, parted, lost):
     """Cut the stretched bonds that cross a crack or whose ends have failed otherwise, and those of a loose particle.
 
-    lost[i] = how many bonds particle i has lost; the others keep their order.
+    lost[i] = how many bonds particle i has lost; the others keep their order. parted[i] = length of the shortest that
+    it has ever lost.
     """
     for i in range(begin, end):
         kept = 0
@@ -198,6 +202,8 @@ def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, 
                     for d in range(DIMENSIONS + 1):
                         bond[i, kept * (DIMENSIONS + 1) + d] = bond[i, n * (DIMENSIONS + 1) + d]
                 kept += 1
+            else:
+                parted[i] = min(parted[i], sqrt(dot(x, x)))
         for n in range(kept, bond_count[i]):
             key[i, n] = -1
         lost[i] = bond_count[i] - kept
@@ -254,7 +260,7 @@ def mark_debris(begin, end, facts, mark):
 
 
 @driver
-def tell(begin, end, volume, body, loose, exposed, bond_count, crack, damage, facts):
+def tell(begin, end, volume, body, loose, exposed, bond_count, parted, crack, damage, facts):
     """facts[i] = what others must know of a particle, in the columns above."""
     for i in range(begin, end):
         facts[i, VOLUME] = volume[i]
@@ -263,6 +269,7 @@ def tell(begin, end, volume, body, loose, exposed, bond_count, crack, damage, fa
         facts[i, LOOSE] = 1.0 if loose[i] > 0 else 0.0
         facts[i, EXPOSED] = 1.0 if exposed[i] > 0 else 0.0
         facts[i, DEBRIS] = 1.0 if bond_count[i] == 0 else 0.0
+        facts[i, PARTED] = parted[i]
         for d in static_range(DIMENSIONS):
             facts[i, CRACK + d] = crack[i, d]
 
@@ -361,14 +368,16 @@ def bound(begin, end, bond_count, size, body, sound, viscous, density, deformati
 
 
 @driver
-def open_voids(begin, end, dt, volume, mass, density, bond_count, damage, void, gradient):
-    """Failed particles do not swell: what their surroundings give way is void, and must close again first."""
+def open_voids(begin, end, dt, body, eos, energy, volume, mass, density, bond_count, damage, void, gradient):
+    """Failed particles swell until they have no pressure: what their surroundings give way beyond that is void, and
+    must close again first."""
     for i in range(begin, end):
         if has_failed(damage, i) or bond_count[i] == 0:
+            law = tuple(eos[body[i], k] for k in static_range(EOS_CONSTANTS))
             divergence = trace(matrix_of(gradient, i))
             swollen = log(mass[i] / (volume[i] * density[i]))
             whole = swollen + void[i] + dt * divergence
-            solid = min(whole, 0.0)
+            solid = min(whole, free_swelling(energy[i], law))
             void[i] = whole - solid
             growth = ((solid - swollen) / dt - divergence) / DIMENSIONS
             for d in static_range(DIMENSIONS):

@@ -3,7 +3,7 @@
 from math import pow, sqrt
 
 from distfsi.device.markers import driver, helper
-from distfsi.kernels.bonds import BODY, DEBRIS, EXPOSED
+from distfsi.kernels.bonds import BODY, DEBRIS, EXPOSED, PARTED
 from distfsi.kernels.solid import DENSITY, MASS, SOUND_SPEED, VELOCITY, difference
 from distfsi.physics.contact import contact_force
 from distfsi.physics.subset import static_range
@@ -25,8 +25,9 @@ def side_of_cube(volume):
 
 
 @driver
-def mark_touching(begin, end, state, facts, key, through, size, side, mark):
-    """mark[i] = 1 for exposed particles and debris, else 0; size[i] [m] of a particle; side[i] = number of its body.
+def mark_touching(begin, end, state, facts, key, through, size, parted, side, mark):
+    """mark[i] = 1 for exposed particles and debris, else 0; size[i] [m] of a particle; side[i] = number of its body;
+    parted[i] as kernels/bonds.py has it.
 
     through (bodies,): the axes, as bits, along which a body goes on behind a symmetry plane; an image at a plane where
     its body ends belongs to another one.
@@ -35,6 +36,7 @@ def mark_touching(begin, end, state, facts, key, through, size, side, mark):
         own = int(facts[i, BODY])
         beyond = key[i] % IMAGE_BITS & (IMAGE_BITS - 1 - through[own]) > 0
         size[i] = side_of_cube(state[i, MASS] / state[i, DENSITY])
+        parted[i] = facts[i, PARTED]
         side[i] = own + (len(through) if beyond else 0)
         mark[i] = 1 if facts[i, EXPOSED] > 0.0 or facts[i, DEBRIS] > 0.0 else 0
 
@@ -62,12 +64,13 @@ def mark_invalid(begin, end, skin, rows, key, facts, position, size, who, place,
 
 
 @helper
-def force_between(position, state, reference, size, body, i, j):
-    """Contact force on particle i by j. Particles of one body have not touched each other in the reference state."""
+def force_between(position, state, reference, size, parted, body, i, j):
+    """Contact force on particle i by j. Particles of one body have not touched each other in the reference state, nor
+    when their bond was cut: a spring must be pressed before it pushes."""
     touching = 0.5 * (size[i] + size[j])
     if body[i] == body[j]:
         X = difference(reference, 0, i, j)
-        touching = SAME_BODY * min(touching, sqrt(dot(X, X)))
+        touching = min(SAME_BODY * min(touching, sqrt(dot(X, X))), max(parted[i], parted[j]))
     densities = (state[i, DENSITY], state[j, DENSITY])
     speeds = (state[i, SOUND_SPEED], state[j, SOUND_SPEED])
     moduli = (densities[0] * speeds[0] * speeds[0], densities[1] * speeds[1] * speeds[1])
@@ -76,14 +79,16 @@ def force_between(position, state, reference, size, body, i, j):
 
 
 @driver
-def touch(begin, end, rows, neighbours, neighbour_count, position, state, reference, size, body, mass, acceleration):
+def touch(
+    begin, end, rows, neighbours, neighbour_count, position, state, reference, size, parted, body, mass, acceleration
+):
     """Add the contact forces to the acceleration of the particles `rows`, each with its row of `neighbours`, which are
     counted among the `rows`."""
     for r in range(begin, end):
         i = rows[r]
         force = tuple(0.0 for _ in static_range(DIMENSIONS))
         for n in range(neighbour_count[r]):
-            push = force_between(position, state, reference, size, body, i, rows[neighbours[r, n]])
+            push = force_between(position, state, reference, size, parted, body, i, rows[neighbours[r, n]])
             force = tuple(force[d] + push[d] for d in static_range(DIMENSIONS))
         for d in static_range(DIMENSIONS):
             acceleration[i, d] += force[d] / mass[i]
@@ -91,7 +96,21 @@ def touch(begin, end, rows, neighbours, neighbour_count, position, state, refere
 
 @driver
 def heat_contact(
-    begin, end, rows, neighbours, neighbour_count, position, state, reference, size, body, mass, dt, motion, energy
+    begin,
+    end,
+    rows,
+    neighbours,
+    neighbour_count,
+    position,
+    state,
+    reference,
+    size,
+    parted,
+    body,
+    mass,
+    dt,
+    motion,
+    energy,
 ):
     """Advance the energy by half the work of the contact forces; `motion` (count, D …): means of velocities."""
     for r in range(begin, end):
@@ -99,6 +118,6 @@ def heat_contact(
         power = 0.0
         for n in range(neighbour_count[r]):
             j = rows[neighbours[r, n]]
-            push = force_between(position, state, reference, size, body, i, j)
+            push = force_between(position, state, reference, size, parted, body, i, j)
             power -= 0.5 * dot(push, difference(motion, 0, i, j))
         energy[i] += dt * power / mass[i]

@@ -9,7 +9,7 @@ from math import floor
 from distfsi.device.markers import ByHand, driver, helper
 from distfsi.kernels.material import matrix_of
 from distfsi.physics.pair import (
-    approach_speed,
+    approach_speeds,
     corrected_stress,
     gradient_correction,
     mid_step,
@@ -22,7 +22,7 @@ from distfsi.physics.pair import (
 from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
-from distfsi.physics.tensors import dot, product
+from distfsi.physics.tensors import dot, product, times
 
 MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
 
@@ -133,15 +133,22 @@ def store_matrix(A, i, matrix):
 
 
 @helper
-def pair_geometry(position, state, i, j):
-    """dx, slope of W, approach speed and Monaghan's Pi of a pair."""
+def along(matrix, dx):
+    """dx . matrix dx"""
+    return dot(dx, times(matrix, dx))
+
+
+@helper
+def pair_geometry(position, state, rates, i, j):
+    """dx, slope of W, approach speed and Monaghan's Pi of a pair; `rates`: velocity gradients."""
     dx = difference(position, 0, i, j)
     distance2 = dot(dx, dx)
     h = 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING])
-    approach = approach_speed(difference(state, VELOCITY, i, j), dx, distance2, h)
+    seen = (along(matrix_of(rates, i), dx), along(matrix_of(rates, j), dx))
+    approach, rough = approach_speeds(difference(state, VELOCITY, i, j), dx, seen, distance2, h)
     mean_sound = 0.5 * (state[i, SOUND_SPEED] + state[j, SOUND_SPEED])
     mean_density = 0.5 * (state[i, DENSITY] + state[j, DENSITY])
-    return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, mean_sound, mean_density))
+    return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, rough, mean_sound, mean_density))
 
 
 @driver
@@ -168,7 +175,7 @@ def press(begin, end, pressure, pushed):
 
 
 @driver
-def accelerate(begin, end, position, state, neighbours, neighbour_count, stress, acceleration, limits):
+def accelerate(begin, end, position, state, neighbours, neighbour_count, rates, stress, acceleration, limits):
     """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow."""
     for i in range(begin, end):
         total = tuple(0.0 for _ in static_range(DIMENSIONS))
@@ -176,7 +183,7 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, stress,
         own = matrix_of(stress, i)
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
-            dx, slope, approach, Pi = pair_geometry(position, state, i, j)
+            dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
             densities = state[i, DENSITY] * state[j, DENSITY]
             pull = pair_acceleration(dx, slope, plus(own, matrix_of(stress, j)), densities, Pi)
             total = tuple(total[d] + state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
@@ -190,7 +197,9 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, stress,
 
 
 @driver
-def heat(begin, end, position, state, neighbours, neighbour_count, dt, stress, correction, velocity, energy, gradient):
+def heat(
+    begin, end, position, state, neighbours, neighbour_count, rates, dt, stress, correction, velocity, energy, gradient
+):  # fmt: skip
     """Advance the energy (Eq. 5c) and find the velocity gradient; `velocity` is the new one, of all particles.
 
     The energy takes the mean of the old and the new velocities, so that kinetic and internal energy exchange exactly.
@@ -201,7 +210,7 @@ def heat(begin, end, position, state, neighbours, neighbour_count, dt, stress, c
         own = matrix_of(stress, i)
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
-            dx, slope, approach, Pi = pair_geometry(position, state, i, j)
+            dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
             before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
             mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
             densities = state[i, DENSITY] * state[j, DENSITY]

@@ -48,7 +48,7 @@ DRIVERS = (
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 LOOSE_BELOW = 0.1  # least eigenvalue of the moment, below which the gradient's correction fades
 ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
-FACTS = 6  # columns of what ghosts are told besides, see kernels/bonds.py
+FACTS = 7  # columns of what ghosts are told besides, see kernels/bonds.py
 
 
 class TotalLagrangian:
@@ -59,6 +59,7 @@ class TotalLagrangian:
     bonds             (n, width) keys of the partners in ascending order, -1 for none; bond_count (n,)
     correction        (n, D D) gradient correction; deformation (n, D D) deformation gradient, by rows
     viscous_pressure  (n,) [Pa]
+    parted            (n,) length of the shortest bond that was cut, when it was cut [m]
     void              (n,) logarithm of how much larger a failed particle is with its void
     piece             (n,) smallest id of all particles that intact bonds hold together, as of label_pieces()
     around            (n,) largest damage of the particle and its partners so far
@@ -74,12 +75,13 @@ class TotalLagrangian:
         search: NeighbourSearch,
         communicator: Communicator,
         scene: Solid,
+        eos: Any,
         strength: Any,
         dimensions: int,
     ):
-        """`strength`: that table of the materials, on the device."""
+        """`eos`, `strength`: those tables of the materials, on the device."""
         self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
-        self._communicator, self._strength = communicator, strength
+        self._communicator, self._eos, self._strength = communicator, eos, strength
         self._spacing = np.array([body.spacing for body in scene.bodies])
         self._support = 2.0 * scene.smoothing * self._spacing.max()
         self._size = self._device.array(scene.smoothing * self._spacing)
@@ -103,7 +105,7 @@ class TotalLagrangian:
         bonds[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = key
         c["bonds"], c["bond_count"] = bonds, count
         c["viscous_pressure"], c["void"], c["around"] = np.zeros(n), np.zeros(n), np.zeros(n)
-        c["crack"] = np.zeros((n, D))
+        c["crack"], c["parted"] = np.zeros((n, D)), np.full(n, self._support)
         c["loose"] = np.zeros(n, dtype=np.int64)
         plan = exchange.ghosts(*c.read("position"), c["id"], self._support, self.asked(c))
         volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
@@ -232,7 +234,7 @@ class TotalLagrangian:
         material = c.read("density", "sound_speed", "plastic_strain", "deviator", "pressure", "viscous_pressure")
         shape = c.read("correction", "deformation", "position", "reference", "loose", "around")
         self._run(n, "stress_bonds", *c.read("body"), self._strength, *material, *shape, tension)
-        known = c.read("volume", "body", "loose", "exposed", "bond_count", "crack")
+        known = c.read("volume", "body", "loose", "exposed", "bond_count", "parted", "crack")
         self._run(n, "tell", *known, self._damage(c), facts)
         return [(*c.read("reference"), "position"), (tension, parity), (facts, (*((),) * FACTS, *vector))]
 
@@ -265,7 +267,7 @@ class TotalLagrangian:
             known = (*c.read("deformation", "damage"), facts, *c.write("crack"))
             self._run(near.own, "crack", *spacing, *self._bonds(c), self._reference, self._tensions, *known)
         bonds = (*c.write("bonds", "bond_count"), self._partner, self._bond)
-        self._run(near.own, "cut", near.position, self._reference, *spacing, facts, *bonds, lost)
+        self._run(near.own, "cut", near.position, self._reference, *spacing, facts, *bonds, *c.write("parted"), lost)
         self._run(near.own, "mark_cut", lost, mark)
         count, rows = self._rows.marked(mark)
         if not count:
@@ -280,7 +282,7 @@ class TotalLagrangian:
         """Advance energy and deformation by `dt` [s] with the old and the new `velocity` (count, D), and write the
         velocity gradient (own, D D) [1/s]; after accelerate()."""
         if near.flags[1]:
-            self._debris.strain(c, near, dt, velocity, gradient)
+            self._debris.strain_debris(c, near, dt, velocity, gradient)
         motion = self._device.empty((near.plan.count, 2 * self._dimensions))
         self._run(near.plan.count, "mean_motion", near.state, velocity, motion)
         material = c.read("volume", "mass", "correction", "h", "density", "sound_speed")
@@ -289,5 +291,5 @@ class TotalLagrangian:
         self._run(near.own, "stretch", dt, *self._bonds(c), self._tensions, motion, *given)
         self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
         if near.flags[1] and dt > 0.0:
-            parted = (*c.read("volume", "mass", "density", "bond_count"), self._damage(c), *c.write("void"), gradient)
-            self._run(near.own, "open_voids", dt, *parted)
+            material = (*c.read("body"), self._eos, *c.read("energy", "volume", "mass", "density", "bond_count"))
+            self._run(near.own, "open_voids", dt, *material, self._damage(c), *c.write("void"), gradient)

@@ -35,19 +35,20 @@ class Contact:
         self._then: tuple | None = None
 
     def find(self, c: Columns, near: Near, reference: Any, facts: Any, through: Any) -> None:
-        """Find who may touch, with the `reference` positions (count, D), the `facts` (count, 6) of kernels/bonds.py and
+        """Find who may touch, with the `reference` positions (count, D), the `facts` (count, …) of kernels/bonds.py and
         the axes `through` (bodies,) which bodies go on. Particles with a bond do not touch."""
         device, count = self._device, near.plan.count
-        size, side, mark = device.empty(count), device.empty(count, np.int64), device.empty(count, np.int8)
+        size, parted = device.empty(count), device.empty(count)
+        side, mark = device.empty(count, np.int64), device.empty(count, np.int8)
         known = (near.plan.key.there, facts, near.position, size)
-        device.run(self._kernels.mark_touching, count, near.state, facts, known[0], through, size, side, mark)
+        device.run(self._kernels.mark_touching, count, near.state, facts, known[0], through, size, parted, side, mark)
         number, rows = self._rows.marked(mark)
         if not self._still_valid(number, rows, known):
             self._then = device.empty(number, np.int64), device.empty((number, self._dimensions)), device.empty(number)
             device.run(self._kernels.remember, number, rows, *known, *self._then)
             self._table, self._count = self._candidates(c, near, device.get(rows), rows, size, facts)
         self._among = (rows, self._table, self._count)
-        self._pairs = (near.position, near.state, reference, size, side)
+        self._pairs = (near.position, near.state, reference, size, parted, side)
 
     def _still_valid(self, number: int, rows: Any, known: tuple) -> bool:
         if self._then is None or self._then[0].shape[0] != number:

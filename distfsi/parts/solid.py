@@ -87,7 +87,7 @@ class Solid:
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
         self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(self.kernels, team, search, self.dimensions)
         if scene.solid.form == "total_lagrangian":
-            given = (communicator, scene.solid, self._tables[1], self.dimensions)
+            given = (communicator, scene.solid, *self._tables[:2], self.dimensions)
             self.form = TotalLagrangian(self.kernels, self.exchange, search, *given)
         self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
         self._gravity_work = np.zeros(blocks.local_count)

@@ -16,13 +16,17 @@ DRIVERS = (kernels.correct, kernels.accelerate, kernels.heat, kernels.press)
 
 
 class UpdatedLagrangian:
-    """Forces and strain of the particles that are near each other; of those without neighbours nothing changes."""
+    """Forces and strain of the particles that are near each other; of those without neighbours nothing changes.
+
+    velocity_gradient  (n, D D) that of the last step [1/s], by rows: a column of the solid
+    """
 
     def __init__(self, kernels: SimpleNamespace, device: Device, search: NeighbourSearch, dimensions: int):
         self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
 
     def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
-        """The reference state is of no concern."""
+        """Add the column."""
+        columns["velocity_gradient"] = np.zeros((len(columns["id"]), self._dimensions**2))
 
     def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
         """There are no bonds that make pieces."""
@@ -36,32 +40,42 @@ class UpdatedLagrangian:
         return []
 
     def told(self, columns: Columns) -> list:
-        """What ghosts and images must have besides the state, with parities."""
-        return []
+        """What ghosts and images must have besides the state, with parities: the velocity gradient."""
+        axes = range(self._dimensions)
+        return [(*columns.read("velocity_gradient"), tuple((a, b) for a in axes for b in axes))]
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Write the `acceleration` (own, D) of the forces and the time steps (own, 2) that they allow."""
         self._search.find(near.own, near.position, near.state, near.plan.key.there, near.support)
-        self._act(near, *columns.read("pressure", "deviator"), acceleration, limits)
+        self._act(near, *near.told, *columns.read("pressure", "deviator"), acceleration, limits)
 
     def push_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
-        """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure."""
+        """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure, and
+        whose every approach is damped."""
         self._search.find_among(debris, near.own, near.position, near.state, near.plan.key.there, near.support)
         pressure, deviator = columns.read("pressure", "deviator")
         pushed = self._device.empty(near.own)
         self._device.run(self._kernels.press, near.own, pressure, pushed)
-        self._act(near, pushed, self._device.zeros(deviator.shape), acceleration, limits)
+        rates = self._device.zeros((near.plan.count, self._dimensions**2))
+        no_shear = self._device.zeros(deviator.shape)
+        self._act(near, rates, pushed, no_shear, acceleration, limits)
 
-    def _act(self, near: Near, pressure: Any, deviator: Any, acceleration: Any, limits: Any) -> None:
+    def _act(self, near: Near, rates: Any, pressure: Any, deviator: Any, acceleration: Any, limits: Any) -> None:
         D, own, run = self._dimensions, near.own, self._device.run
         self._pairs = (near.position, near.state, self._search.table, self._search.count)
         self._correction, stress = (self._device.empty((own, D * D)) for _ in range(2))
         run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
         (self._stress,) = near.plan.exchange([(stress, near.matrix)])
-        run(self._kernels.accelerate, own, *self._pairs, self._stress, acceleration, limits)
+        self._rates = rates
+        run(self._kernels.accelerate, own, *self._pairs, rates, self._stress, acceleration, limits)
 
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance the energy by `dt` [s] with the old and the new `velocity` (count, D), and write the velocity
         gradient (own, D D) [1/s]; after accelerate()."""
-        given = (dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
+        self.strain_debris(columns, near, dt, velocity, gradient)
+        columns.adopt("velocity_gradient", gradient)
+
+    def strain_debris(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
+        """As strain(), after push_debris()."""
+        given = (self._rates, dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
         self._device.run(self._kernels.heat, near.own, *self._pairs, *given)

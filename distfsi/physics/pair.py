@@ -12,18 +12,26 @@ from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA
 from distfsi.physics.tensors import dot, identity_plus, inverse, least_eigenvalue, product, rows, times
 
 
-def approach_speed(dv, dx, distance2, h):
-    """-phi of Eq. 6 [m/s] if the particles approach each other, else 0."""
-    return max(-h * dot(dv, dx) / (distance2 + 0.01 * h * h), 0.0)
+def approach_speeds(dv, dx, seen, distance2, h):
+    """-phi of Eq. 6 [m/s] if the particles approach each other, else 0; and the same without what both have `seen`.
+
+    `seen`: dx . (grad v) dx of either particle [m2/s]. Where both are compressions, their harmonic mean is the jump of
+    velocity of a smooth flow, limited as van Leer's slopes are (after Frontiere, Raskin & Owen, J. Comput. Phys. 332,
+    2017); only the rest is damped. Shocks and waves between the particles are not seen.
+    """
+    own, other = min(seen[0], 0.0), min(seen[1], 0.0)
+    smooth = 2.0 * own * other / min(own + other, -1e-300)
+    per_length = h / (distance2 + 0.01 * h * h)
+    whole = dot(dv, dx)
+    return (max(-whole * per_length, 0.0), max((smooth - whole) * per_length, 0.0))
 
 
-def viscosity(approach, sound_speed, density):
+def viscosity(approach, rough, sound_speed, density):
     """Monaghan's Pi [m5/(kg s2)] of an approach speed at the mean sound speed and density (Eq. 6).
 
-    Its linear part is not limited to shocks as that of the bonds is: without it at small jumps a body that turns grows
-    waves between its particles.
+    Its linear part damps what is `rough` of the approach.
     """
-    return approach * (VISCOSITY_ALPHA * sound_speed + VISCOSITY_BETA * approach) / density
+    return (VISCOSITY_ALPHA * sound_speed * rough + VISCOSITY_BETA * approach * approach) / density
 
 
 def gradient_correction(moment):

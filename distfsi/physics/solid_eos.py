@@ -5,7 +5,7 @@ K mu (1 + b1 mu + b2 mu^2) / D(mu)^2, with K = rho0 c0^2, mu = rho/rho0 - 1 and 
 The linear law p = K mu is s1 = 1, all others 0.
 """
 
-from math import sqrt
+from math import log, sqrt
 
 
 def solid_pressure(density, energy, eos):
@@ -37,3 +37,11 @@ def solid_sound_speed(density, bulk, shear_modulus, eos):
     """Longitudinal sound speed [m/s]; expanded hot material keeps a tenth of the reference bulk modulus."""
     floor = 0.1 * eos[0] * eos[1] * eos[1]
     return sqrt((max(bulk, floor) + 4.0 / 3.0 * shear_modulus) / density)
+
+
+def free_swelling(energy, eos):
+    """Logarithm of the volume over the reference one at which material of that specific `energy` [J/kg] has no
+    pressure; 0 where it would have to be compressed. Gas of the solid's own is not known: no more than tenfold."""
+    rho0, c0, s1, s2, s3, gamma0, a, b1, b2 = eos
+    hot = max(energy, 0.0)
+    return -log(max(1.0 - gamma0 * hot / (c0 * c0 + a * hot), 0.1))
