@@ -91,8 +91,8 @@ def test_noh(dimensions, cells, plateau, record_property, capsys):
     assert density[behind].mean() == pytest.approx(1.0, abs=plateau)
     ahead = 4.0 ** (dimensions - 1) / 4.0**dimensions
     off = (half_way(r, density, 0.5 * (1.0 + ahead)) - 0.2) * cells
-    record_property("shock off, in cells", off)
-    record_property("density at the centre, over the exact one", density[0])
+    record_property("shock off, in cells", float(off))
+    record_property("density at the centre, over the exact one", float(density[0]))
     with capsys.disabled():
         print(
             f"\nNoh {dimensions}D, {cells} cells: shock off by {off:+.2f} cells, density at the centre {density[0]:.3f}"

@@ -138,7 +138,7 @@ def test_slow_shock(record_property):
     profile = tube.run(400, **SECOND_ORDER)
     momentum = profile.density * profile.velocity
     ripple = np.abs(momentum[(profile.x > 0.1) & (profile.x < 0.45)] / (3.86 * -0.81) - 1.0).max()
-    record_property("ripple", ripple)
+    record_property("ripple", float(ripple))
     assert ripple < 0.05
 
 
