@@ -29,9 +29,8 @@ from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
 from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, scaled, times, trace
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
-VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, CRACK = range(
-    8
-)  # columns of `facts`: what ghosts are told besides
+# Columns of `facts`: what ghosts are told besides.
+VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, CRACK = range(8)
 SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
 
