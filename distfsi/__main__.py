@@ -46,7 +46,12 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("input", help="the scene, a TOML file")
         _add_overrides(command)
     run.add_argument("--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)")
-    run.add_argument("--gpu", action="store_true", help="compute on the node's GPUs; not for the paper's coupling")
+    run.add_argument("--gpu", action="store_true", help="compute on the node's GPUs")
+    run.add_argument(
+        "--gpu-aware-mpi",
+        action="store_true",
+        help="with --gpu: messages straight from the memory of the GPUs, if a trial shows that MPI takes it",
+    )
     run.add_argument(
         "--restart",
         metavar="auto|FILE",
@@ -130,7 +135,8 @@ def run(arguments: argparse.Namespace) -> None:
     communicator = _start_ranks()
     with _telling_once(communicator):
         scene = _load_once(load, arguments, communicator)
-        simulation.run(scene, communicator, arguments.threads, arguments.restart, arguments.gpu)
+        gpus = arguments.gpu, arguments.gpu_aware_mpi
+        simulation.run(scene, communicator, arguments.threads, arguments.restart, *gpus)
 
 
 def check(arguments: argparse.Namespace) -> None:

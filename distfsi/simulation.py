@@ -19,6 +19,7 @@ from distfsi.device.cpu import Team
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.nvrtc import CompileError
 from distfsi.device.seam import Device
+from distfsi.direct import arrives, refusal
 from distfsi.errors import Diverged, InputError, StepFailed, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -349,20 +350,30 @@ def threads_of_rank(communicator: Communicator) -> int:
     return max(1, len(own[1]) // communicator.allgather(own).count(own))
 
 
-def gpu_of_rank(scene: Scene, communicator: Communicator) -> Device:
-    """Collective. The GPU on which this rank computes the scene. Raises InputError on all ranks where it cannot."""
+def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
+    """Collective. The GPU on which this rank computes. Raises InputError on all ranks where one has none.
+
+    `direct`: messages are to lie in the GPU's memory.
+    """
     gpu, faults = None, []
-    if scene.solid and scene.fluid and scene.coupling.scheme == "paper":
-        faults.append('--gpu: coupling.scheme "paper" is computed on the CPU only; run without --gpu')
-    else:
-        try:
-            gpu = gpu_of(communicator.local_rank)
-        except (NoGpu, CompileError) as error:
-            faults.append(f"--gpu: {error}")
+    try:
+        gpu = gpu_of(communicator.local_rank, direct)
+    except (NoGpu, CompileError) as error:
+        faults.append(f"--gpu: {error}")
+    _refuse(faults, communicator)
+    if direct:
+        why = refusal(communicator)
+        _refuse([f"--gpu-aware-mpi: {why}"] if why else [], communicator)
+        if not arrives(communicator, gpu):
+            raise InputError(["--gpu-aware-mpi: messages between ranks arrive otherwise than they were sent"])
+    return gpu
+
+
+def _refuse(faults: list[str], communicator: Communicator) -> None:
+    """Collective. Raise InputError on all ranks when one has faults."""
     faults = [fault for others in communicator.allgather(faults) for fault in others]
     if faults:
         raise InputError(sorted(set(faults)))
-    return gpu
 
 
 def run(
@@ -371,11 +382,13 @@ def run(
     threads: int | None = None,
     restart: str | None = None,
     on_gpu: bool = False,
+    direct: bool = False,
 ) -> Simulation:
     """Run the scene to its end, writing fields, history, restart files and a picture into its output directory.
 
     `restart`: a restart file to go on from, or "auto": the newest in the output directory; without one from the start.
-    `on_gpu`: compute on the node's GPUs, rank by rank, in the place of threads.
+    `on_gpu`: compute on the node's GPUs, rank by rank, in the place of threads; `direct`: with messages straight from
+    their memory.
     Raises on all ranks: InputError for a restart file of another scene, OutputError, Diverged, and Stopped when a
     signal, the stop file or the wall-clock limit has ended the run early.
     """
@@ -390,7 +403,7 @@ def run(
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)
-    costs, device = None, gpu_of_rank(scene, communicator) if on_gpu else None
+    costs, device = None, gpu_of_rank(communicator, direct) if on_gpu else None
     with requests, closing(progress), threadpool_limits(1), journal:
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import copy
 import sys
+from dataclasses import replace
 from functools import partial
-from itertools import cycle
+from itertools import product
 
 import numpy as np
 
 from distfsi.device import cuda
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
-from distfsi.device.host import HostRuntime
+from distfsi.device.host import HostArray, HostRuntime
 from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import load
-from distfsi.scene.description import Ball, FluidState, HalfSpace, Performance, Region
+from distfsi.scene.description import Ball, FluidState, HalfSpace, Peaks, Performance, Region
 from distfsi.simulation import Simulation
 from fluids import MATERIALS
 from launch import ROOT
@@ -25,7 +26,7 @@ from tubes import scene_of
 
 SCENES = {
     "tube": (("air",), 1, {}),
-    "bubble": (("air", "helium"), 2, {"riemann": "adaptive"}),
+    "bubble": (("air", "helium"), 2, {"riemann": "adaptive", "reconstruction": "weno5"}),
     "bubble, float32": (("air", "helium"), 2, {"precision": "float32"}),
 }
 STEPS = 4
@@ -35,7 +36,9 @@ COARSE = (
     "solid.bodies.tube.spacing=1 mm",
     "output.peaks=true",
 )
-SOLIDS = {colliding_discs: (20, (True, False)), bursting_ball: (62, (True,))}  # steps, late or not
+WAYS = ((True, False), (False, True))  # as late as their order allows or as early; messages of the host or the device
+MOVES = (colliding_discs, 2)
+SOLIDS = {colliding_discs: (20, WAYS), bursting_ball: (62, ((True, True),))}  # steps, ways
 
 
 def scene(names, dimensions, **method):
@@ -45,7 +48,7 @@ def scene(names, dimensions, **method):
     shocked = FluidState(0, 2.0, 4.0, (1.0,) + (0.0,) * (D - 1))
     bubble = FluidState(len(names) - 1, 0.2, 1.0, (0.0,) * D)
     cells, performance = ((64,), ((16,), (16,))) if D == 1 else ((48, 20), ((16, 8), (8, 8)))
-    return scene_of(
+    flow = scene_of(
         tuple(MATERIALS[name] for name in names),
         (
             Region(still, None),
@@ -60,15 +63,15 @@ def scene(names, dimensions, **method):
         performance=Performance(*performance),
         **method,
     )
+    return replace(flow, output=replace(flow.output, peaks=Peaks(1.0, 0.01)))
 
 
 def result(name, device):
-    """State, time and books after some steps; and the state that a restart brings back, one step later."""
+    """State, peaks, time and books after some steps; and the state that a restart brings back, one step later."""
     names, dimensions, method = SCENES[name]
-    simulation = Simulation.of(scene(names, dimensions, **method), Communicator(), device=device)
-    fluid, messenger = simulation.fluid, None
-    if isinstance(device, Gpu) and isinstance(device.runtime, HostRuntime):
-        fluid.exchange._world = messenger = Messenger(fluid.exchange._world, device.runtime)
+    communicator = watched(Communicator(), device)
+    simulation = Simulation.of(scene(names, dimensions, **method), communicator, device=device)
+    fluid, peaks = simulation.fluid, simulation.watchers[0].fields
     for _ in range(STEPS):
         simulation.step()
         fluid.exchange_ghosts(fluid.stages[0])
@@ -79,24 +82,26 @@ def result(name, device):
     simulation.step()
     fluid.restore(kept)
     again = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
-    return [*cells, *books, *again, np.array([messenger.too_early if messenger else 0])]
+    return [*cells, *books, *again, peaks.here(), faults_of(communicator)]
 
 
 def solid_result(case, steps, device):
     """All columns, books and bounds of the time step after some steps of a solid."""
-    part, _ = case(device)
+    part, _ = case(device, watched(Communicator(), device))
     for _ in range(steps):
         step(part)
     part.prepare()
     books = [*part.totals().values(), part.boundary_impulse(), np.array([part.gravity_work(), part.time_step()[0]])]
     part.label_pieces()
-    return [*part.columns.values(), *map(np.atleast_1d, books)]
+    return [*part.columns.values(), *map(np.atleast_1d, books), faults_of(part.communicator)]
 
 
-def coupled_result(device):
-    """Fluid, particles, books and peaks of a coarse steel tube after 50 steps, and one step after a restart there."""
-    simulation = Simulation.of(load(ROOT / "inputs/steel_tube.toml", COARSE), Communicator(), 1, device=device)
-    for _ in range(50):
+def coupled_result(device, scheme="cut_cells", steps=50):
+    """Fluid, particles, books and peaks of a coarse steel tube after some steps, and one after a restart there."""
+    changes = (*COARSE, f"coupling.scheme={scheme}")
+    communicator = watched(Communicator(), device)
+    simulation = Simulation.of(load(ROOT / "inputs/steel_tube.toml", changes), communicator, 1, device=device)
+    for _ in range(steps):
         simulation.step()
     state, snapshots = coupled_state(simulation), {n: part.snapshot() for n, part in simulation.kept().items()}
     snapshots = copy.deepcopy(snapshots)
@@ -104,7 +109,7 @@ def coupled_result(device):
     for name, part in simulation.kept().items():
         part.restore(snapshots[name])
     simulation.step()
-    return state + coupled_state(simulation)
+    return [*state, *coupled_state(simulation), faults_of(communicator)]
 
 
 def coupled_state(simulation):
@@ -124,44 +129,69 @@ def same(results, expected):
 
 
 class Messenger:
-    """The communicator of a ghost exchange: it counts the messages that the device may still work on."""
+    """In the place of MPI's communicator: it counts the messages that the device may still work on, and those of the
+    device's memory where there should be none, or none where there should be."""
 
-    def __init__(self, world, runtime):
-        self._world, self._runtime, self.too_early = world, runtime, 0
+    def __init__(self, world, device):
+        self._world, self._device, self.too_early, self.direct, self.staged = world, device, 0, 0, 0
+
+    def __getattr__(self, name):
+        return getattr(self._world, name)
 
     def Isend(self, *arguments):
-        return self._watched(self._world.Isend, arguments)
+        return self._watched(self._world.Isend, *arguments)
 
     def Irecv(self, *arguments):
-        return self._watched(self._world.Irecv, arguments)
+        return self._watched(self._world.Irecv, *arguments)
 
-    def _watched(self, message, arguments):
-        self.too_early += not self._runtime.is_idle(Queue.BESIDE)
-        return message(*arguments)
+    def _watched(self, message, values, rank):
+        self.too_early += not self._device.runtime.is_idle(Queue.BESIDE)
+        self.direct += isinstance(values, HostArray)
+        self.staged += values.dtype != np.uint8 and not isinstance(values, HostArray)
+        return message(values, rank)
+
+    @property
+    def faults(self):
+        wrong, right = (self.staged, self.direct) if self._device.direct else (self.direct, self.staged)
+        return self.too_early + wrong + (right == 0 and self._world.size > 1)
+
+
+def watched(communicator, device):
+    """A communicator whose messages are watched, if the host stands in for a GPU."""
+    if isinstance(device, Gpu) and isinstance(device.runtime, HostRuntime):
+        communicator.world = Messenger(communicator.world, device)
+    return communicator
+
+
+def faults_of(communicator):
+    """What was wrong with messages."""
+    return np.array([getattr(communicator.world, "faults", 0)])
 
 
 def check_scenes():
-    """Every scene, with everything done as late as its order allows, and as early."""
+    """Every scene."""
     for name in SCENES:
         expected = result(name, Team(1))
-        for late in (True, False):
-            assert same(result(name, Gpu(HostRuntime(late))), expected), (name, late)
+        for late, direct in WAYS:
+            assert same(result(name, Gpu(HostRuntime(late), direct)), expected), (name, late, direct)
         print(f"{name}: same bits")
 
 
 def check_solids():
-    """Collisions and a ball that bursts, as late and as early as their order allows."""
-    for case, (steps, orders) in SOLIDS.items():
+    """Collisions and a ball that bursts."""
+    for case, (steps, ways) in SOLIDS.items():
         expected = solid_result(case, steps, Team(1))
-        for late in orders:
-            assert same(solid_result(case, steps, Gpu(HostRuntime(late))), expected), (case.__name__, late)
+        for way in ways:
+            late, direct = way
+            assert same(solid_result(case, steps, Gpu(HostRuntime(late), direct)), expected), (case.__name__, way)
         print(f"{case.__name__}: same bits")
 
 
 def check_coupled():
-    """A coupled scene with peaks, as late as the order allows."""
-    assert same(coupled_result(Gpu(HostRuntime())), coupled_result(Team(1)))
-    print("coupled: same bits")
+    """A coupled scene with peaks, as late as the order allows, with messages of the device."""
+    for case in (("cut_cells", 50), ("paper", 20)):
+        assert same(coupled_result(Gpu(HostRuntime(), True), *case), coupled_result(Team(1), *case)), case
+        print(f"coupled by {case[0]}: same bits")
 
 
 def nothing(*_, **__):
@@ -189,42 +219,38 @@ def close(results, expected):
 
 def check_mutants():
     """Without one of the waits, copies and orders something comes out otherwise, or a message goes too early."""
-    expected = result("bubble", Team(1))
-    for name, take_away in MUTANTS.items():
-        gpu = Gpu(HostRuntime())
-        gpu.with_own_clock = lambda gpu=gpu: gpu
-        take_away(gpu)
-        try:
-            found = not same(result("bubble", gpu), expected)
-        except Diverged:  # on all ranks
-            found = True
-        assert found, name
-        print(f"without {name}: found")
-    expected = solid_result(colliding_discs, 2, Team(1))
-    for name, take_away in SOLID_MUTANTS.items():
-        gpu = Gpu(HostRuntime())
-        take_away(gpu)
-        try:
-            found = not same(solid_result(colliding_discs, 2, gpu), expected)
-        except Diverged:  # on all ranks
-            found = True
-        assert found, name
-        print(f"particles without {name}: found")
+    cases = (("", partial(result, "bubble"), MUTANTS), ("particles ", partial(solid_result, *MOVES), SOLID_MUTANTS))
+    for what, case, mutants in cases:
+        expected = case(Team(1))
+        for (name, take_away), direct in product(mutants.items(), (False, True)):
+            if not (direct and "copy" in name):
+                assert is_found(case, expected, take_away, direct), (what, name, direct)
+                print(f"{what}without {name}{', direct' if direct else ''}: found")
+
+
+def is_found(case, expected, take_away, direct):
+    """Whether a case comes out otherwise when something is taken away."""
+    gpu = Gpu(HostRuntime(), direct)
+    gpu.with_own_clock = lambda: gpu
+    take_away(gpu)
+    try:
+        return not same(case(gpu), expected)
+    except Diverged:  # on all ranks
+        return True
+
+
+def check_fatal():
+    """Without the order before packing rows are packed that are not there yet; what comes of that may kill."""
+    case = partial(solid_result, *MOVES)
+    expected = case(Team(1))
+    assert same(case(Gpu(HostRuntime())), expected)
+    print("begun", flush=True)
+    assert not is_found(case, expected, without_order(Queue.BESIDE), False)
 
 
 def without(name):
     """Takes a method of the device away."""
     return lambda gpu: setattr(gpu, name, lambda *_: None)
-
-
-def without_wait(turn):
-    """Takes every other wait away."""
-
-    def take_away(gpu):
-        wait, turns = gpu.finish_beside, cycle((turn == 0, turn == 1))
-        gpu.finish_beside = lambda: None if next(turns) else wait()
-
-    return take_away
 
 
 def without_order(queue):
@@ -243,16 +269,15 @@ def without_wait_of_get(gpu):
 
 
 MUTANTS = {
-    "the wait before receiving": without_wait(0),
-    "the wait before sending": without_wait(1),
+    "the wait before messages": without("finish_beside"),
     "the copy of what is sent": without("take"),
     "the copy of what came": without("put"),
     "the wait for the ghosts": without_order(Queue.MAIN),
     "the wait for the cells": without_order(Queue.BESIDE),
     "the wait before looking": without_wait_of_get,
 }
-SOLID_MUTANTS = {  # without the wait for the rows to pack there is no result at all
-    "the wait before sending": without("finish_beside"),
+SOLID_MUTANTS = {
+    "the wait before messages": without("finish_beside"),
     "the copy of what is sent": without("take"),
     "the copy of what came": without("put"),
     "the wait for the ghosts": without_order(Queue.MAIN),
@@ -262,4 +287,4 @@ SOLID_MUTANTS = {  # without the wait for the rows to pack there is no result at
 if __name__ == "__main__":
     install_abort_on_exception(Communicator())
     checks = {"scenes": check_scenes, "solids": check_solids, "coupled": check_coupled, "mutants": check_mutants}
-    (checks | {"gpu": check_gpu})[sys.argv[1]]()
+    (checks | {"gpu": check_gpu, "fatal": check_fatal})[sys.argv[1]]()

@@ -34,6 +34,7 @@ def solid(
     gravity=None,
     viscosity=(1.0, 2.0),
     form="updated_lagrangian",
+    communicator=None,
 ):
     """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
     D = len(lower)
@@ -48,7 +49,7 @@ def solid(
         output=d.Output("", 0.0, 1),
         performance=d.Performance((block_cells,) * D, (block_cells,) * D),
     )
-    communicator = Communicator()
+    communicator = communicator or Communicator()
     blocks = Blocks(Grid.of(lower, upper, (16,) * D, kinds), scene.performance.block_cells, communicator)
     return Solid(scene, blocks, communicator, team or Team(1))
 
@@ -80,12 +81,13 @@ def digest(part):
     return len(ids), hashlib.sha256(text).hexdigest()
 
 
-def colliding_discs(team):
+def colliding_discs(team, communicator=None):
     """Two materials that meet near a symmetry plane and cross many blocks, one of them clamped."""
     left = body(d.Ball((-0.42, 0.3), 0.25), 0.05, 8930.0, (900.0, -400.0))
     clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
     right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
-    return solid([left, right], (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, gravity=(0.0, -1e3)), 60
+    box = (-1.0, 0.0), (1.0, 1.0), (1,)
+    return solid([left, right], *box, team, 2, gravity=(0.0, -1e3), communicator=communicator), 60
 
 
 def colliding_balls(team):
@@ -103,11 +105,12 @@ def bonded_discs(team):
     return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, form="total_lagrangian"), 80
 
 
-def bursting_ball(team):
+def bursting_ball(team, communicator=None):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
     failure = d.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, d.Scatter(10.0, 0.1, 1))
     ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
-    part = solid([ball], (-1.0, -1.0, 0.0), (1.0,) * 3, (2,), team, block_cells=2, form="total_lagrangian")
+    box = (-1.0, -1.0, 0.0), (1.0,) * 3, (2,)
+    part = solid([ball], *box, team, 2, form="total_lagrangian", communicator=communicator)
     x = part.columns["position"]
     part.columns["velocity"] = 500.0 * x + 500.0 * np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
     return part, 90

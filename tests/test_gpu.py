@@ -9,6 +9,7 @@ import pytest
 
 import fake_cupy
 import mpi_gpu
+from distfsi import direct
 from distfsi.device import cuda, host
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostArray, HostRuntime
@@ -33,14 +34,15 @@ def test_solids_have_the_bits_of_the_cpu(mpiexec):
 
 
 def test_a_coupled_scene_has_the_bits_of_the_cpu(mpiexec):
-    """50 steps of the coarse steel tube with peaks, and one more after a restart, on 2 ranks."""
-    assert mpiexec(2, SCRIPT, "coupled").count("same bits") == 2
+    """50 steps of the coarse steel tube with peaks, and one more after a restart, on 2 ranks; and by the paper's
+    coupling 20."""
+    assert mpiexec(2, SCRIPT, "coupled").count("same bits") == 2 * 2
 
 
 @pytest.mark.full
 def test_a_run_leaves_the_files_of_the_cpu(monkeypatch, tmp_path):
     """Bonded particles in a fluid."""
-    monkeypatch.setattr("distfsi.simulation.gpu_of", lambda rank: Gpu(HostRuntime()))
+    monkeypatch.setattr("distfsi.simulation.gpu_of", lambda rank, direct: Gpu(HostRuntime()))
     changes = (*mpi_gpu.COARSE, "solid.form=total_lagrangian", "output.schlieren=true", "time.maximum_steps=8")
     for name in ("cpu", "gpu"):
         given = (*changes, "output.fields_every=3e-7", f'output.directory="{tmp_path / name}"')
@@ -65,8 +67,10 @@ def test_a_step_of_a_solid_copies_no_columns(form):
 
 
 def test_every_wait_copy_and_order_is_needed(mpiexec):
-    """On 2 ranks."""
-    assert mpiexec(2, SCRIPT, "mutants").count("found") == 2 * (7 + 4)
+    """On 2 ranks, with messages of the host and of the device; without the order before packing, that ends the run."""
+    assert mpiexec(2, SCRIPT, "mutants").count("found") == 2 * (6 + 4 + 4 + 2)
+    with pytest.raises(AssertionError, match="(?s)exit code.*begun"):
+        mpiexec(2, SCRIPT, "fatal")
 
 
 def test_arrays_of_the_device_stay_there():
@@ -118,8 +122,55 @@ def test_a_rank_without_gpu_says_why(monkeypatch):
         cuda.gpu_of(0)
 
 
-@pytest.mark.parametrize(("scheme", "why"), [("paper", "on the CPU only"), ("cut_cells", "CuPy is not installed")])
-def test_a_run_that_gpus_cannot_do_is_refused(monkeypatch, scheme, why):
+def test_a_run_without_gpu_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "cupy", None)
-    with pytest.raises(InputError, match=why):
-        gpu_of_rank(load(ROOT / "inputs/steel_tube.toml", (f"coupling.scheme={scheme}",)), Communicator())
+    with pytest.raises(InputError, match="CuPy is not installed"):
+        gpu_of_rank(Communicator())
+
+
+# ---- messages of a GPU's memory --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("says", "code", "why"),
+    [
+        (False, "", "does not take memory of GPUs"),
+        (None, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "failed: SIGSEGV"),
+        (True, "raise SystemExit('it arrived otherwise')", "failed: it arrived otherwise"),
+        (True, "import time; time.sleep(60)", "not arrived after"),
+        (True, "import os; raise SystemExit(any('PMI' in name for name in os.environ))", ""),
+    ],
+)
+def test_mpi_is_tried_in_another_process(monkeypatch, tmp_path, says, code, why):
+    """Whatever that process dies of, with nothing in its environment that would make it a rank of this run."""
+    python = tmp_path / "python"
+    python.write_text(f"#!{sys.executable}\n{code}\n")
+    python.chmod(0o700)
+    monkeypatch.setenv("PMI_RANK", "1")
+    monkeypatch.setattr(direct, "PATIENCE", 4.0)
+    monkeypatch.setattr(direct.sys, "executable", str(python))
+    communicator = Communicator()
+    monkeypatch.setattr(communicator, "takes_gpu_memory", lambda: says)
+    refusal = direct.refusal(communicator)
+    assert why in refusal and bool(why) == bool(refusal)
+
+
+def test_a_message_arrives_or_does_not(monkeypatch):
+    """From memory of a device to another one's, by MPI."""
+    communicator, gpu = Communicator(), Gpu(HostRuntime(), direct=True)
+    assert direct.arrives(communicator, gpu)
+    monkeypatch.setattr(communicator, "pass_on", lambda outgoing, incoming: None)
+    assert not direct.arrives(communicator, gpu)
+
+
+@pytest.mark.parametrize(("why", "arrives", "fault"), [("no", True, "no"), ("", False, "otherwise"), ("", True, "")])
+def test_messages_of_a_gpus_memory_are_asked_for_and_tried(monkeypatch, why, arrives, fault):
+    gpu = Gpu(HostRuntime(), direct=True)
+    monkeypatch.setattr("distfsi.simulation.gpu_of", lambda rank, direct: gpu)
+    monkeypatch.setattr("distfsi.simulation.refusal", lambda communicator: why)
+    monkeypatch.setattr("distfsi.simulation.arrives", lambda communicator, gpu: arrives)
+    if fault:
+        with pytest.raises(InputError, match=f"--gpu-aware-mpi: .*{fault}"):
+            gpu_of_rank(Communicator(), direct=True)
+    else:
+        assert gpu_of_rank(Communicator(), direct=True) is gpu

@@ -14,6 +14,7 @@ LAYERS = (
     {"__main__"},
     {"study"},
     {"simulation"},
+    {"direct"},
     {"model", "parts"},
     {"kernels", "mesh", "device", "output", "scene"},
     {"physics"},

@@ -119,8 +119,11 @@ class Team:
     def zeros(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> np.ndarray:
         return np.zeros(shape, dtype)
 
-    def beneath(self, host: np.ndarray) -> np.ndarray:
-        return host
+    def message_memory(self, count: int, dtype: np.dtype) -> np.ndarray:
+        return np.empty(count, dtype)
+
+    def beneath(self, message: np.ndarray) -> np.ndarray:
+        return message
 
     def get(self, there: np.ndarray) -> np.ndarray:
         return there
@@ -129,11 +132,8 @@ class Team:
         if there is not host:
             there[...] = host
 
-    def take(self, host: np.ndarray, there: np.ndarray) -> None:
-        self.put(host, there)
-
-    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
-        return np.empty(count, dtype)
+    def take(self, message: np.ndarray, there: np.ndarray) -> None:
+        self.put(message, there)
 
     def beside(self) -> nullcontext:
         return nullcontext()

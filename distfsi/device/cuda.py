@@ -35,10 +35,13 @@ def gpu_name(ordinal: int) -> str:
     return f"{properties['name'].decode()} ({architecture}, {properties['totalGlobalMem'] / 2**30:.0f} GiB)"
 
 
-def gpu_of(local_rank: int) -> Gpu:
-    """The GPU of a rank: its number on the node, modulo the GPUs that it sees. Raises NoGpu and CompileError."""
+def gpu_of(local_rank: int, direct: bool = False) -> Gpu:
+    """The GPU of a rank: its number on the node, modulo the GPUs that it sees. Raises NoGpu and CompileError.
+
+    `direct`: messages lie in its memory, which MPI must be able to take.
+    """
     nvrtc.library()
-    return Gpu(CupyRuntime(local_rank % gpu_count()))
+    return Gpu(CupyRuntime(local_rank % gpu_count()), direct)
 
 
 def _cupy() -> Any:

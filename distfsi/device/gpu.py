@@ -58,10 +58,10 @@ class Runtime(Protocol):
 
 
 class Gpu:
-    """One GPU, used by one rank."""
+    """One GPU, used by one rank. `direct`: messages lie in its memory, not in pinned memory of the host."""
 
-    def __init__(self, runtime: Runtime):
-        self.runtime, self.seconds = runtime, 0.0
+    def __init__(self, runtime: Runtime, direct: bool = False):
+        self.runtime, self.direct, self.seconds = runtime, direct, 0.0
         self._queue = Queue.MAIN
         self._compiled: dict[tuple, Any] = {}
 
@@ -109,8 +109,11 @@ class Gpu:
     def zeros(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
         return self.runtime.zeros(_lengths(shape), np.dtype(dtype))
 
-    def beneath(self, host: np.ndarray) -> Any:
-        return self.runtime.empty(host.shape, host.dtype)
+    def message_memory(self, count: int, dtype: np.dtype) -> Any:
+        return self.runtime.empty((count,), np.dtype(dtype)) if self.direct else self.runtime.pinned(count, dtype)
+
+    def beneath(self, message: Any) -> Any:
+        return message if self.direct else self.runtime.empty(message.shape, message.dtype)
 
     def get(self, there: Any) -> np.ndarray:
         host = np.empty(there.shape, there.dtype)
@@ -118,14 +121,13 @@ class Gpu:
         self._wait(self._queue)
         return host
 
-    def put(self, there: Any, host: np.ndarray) -> None:
-        self.runtime.upload(there, host, self._queue)
+    def put(self, there: Any, host: Any) -> None:
+        if there is not host:
+            self.runtime.upload(there, host, self._queue)
 
-    def take(self, host: np.ndarray, there: Any) -> None:
-        self.runtime.download(host, there, self._queue)
-
-    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
-        return self.runtime.pinned(count, dtype)
+    def take(self, message: Any, there: Any) -> None:
+        if there is not message:
+            self.runtime.download(message, there, self._queue)
 
     @contextmanager
     def beside(self) -> Iterator[None]:

@@ -79,6 +79,16 @@ class HostArray:
         """The same values in another shape."""
         return HostArray(self.memory.reshape(*shape, copy=False))
 
+    def __getitem__(self, part: slice) -> HostArray:
+        """Some of the same values."""
+        return HostArray(self.memory[part])
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, object]:
+        """Where MPI finds the values."""
+        address, type_name = (self.memory.ctypes.data, False), self.memory.dtype.str
+        return {"shape": self.shape, "typestr": type_name, "data": address, "version": 3}
+
     def __array__(self, *_, **__) -> np.ndarray:
         raise TypeError("an array of the device: get() it")
 

@@ -53,20 +53,22 @@ class Device(Protocol):
     def zeros(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
         """An array of the device that holds zeros."""
 
-    def beneath(self, host: np.ndarray) -> Any:
-        """An array of the device like one of the host, for copies between them; on the CPU that array itself."""
+    def message_memory(self, count: int, dtype: np.dtype) -> Any:
+        """Flat memory that MPI sends from and receives in: the host's, or the device's where MPI is to take that. MPI
+        is given no memory of the device before all that was asked for beside is done."""
+
+    def beneath(self, message: Any) -> Any:
+        """An array of the device like some `message_memory`, for copies between them; where they are one, itself."""
 
     def get(self, there: Any) -> np.ndarray:
         """The values of an array of the device, when all that was asked for before is done."""
 
-    def put(self, there: Any, host: np.ndarray) -> None:
-        """Give an array of the device the values of one of the host, which must stay as it is until that is done."""
+    def put(self, there: Any, host: Any) -> None:
+        """Give an array of the device the values of one of the host, which must stay as it is until that is done; or of
+        `message_memory`."""
 
-    def take(self, host: np.ndarray, there: Any) -> None:
-        """Give an array of the host the values of one of the device; they are there after `finish_beside`."""
-
-    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
-        """Memory of the host for `put` and `take`."""
+    def take(self, message: Any, there: Any) -> None:
+        """Give `message_memory` the values of an array of the device; they are there after `finish_beside`."""
 
     def beside(self) -> AbstractContextManager[None]:
         """What is asked for inside goes to the other queue."""

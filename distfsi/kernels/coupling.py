@@ -10,6 +10,7 @@ from math import floor
 from distfsi.device.markers import driver, helper, load, real, store, workspace
 from distfsi.kernels.fluid import face_fluxes, place, primitives_row, rises_row
 from distfsi.kernels.gather import any_particle, sum_particles
+from distfsi.kernels.solid import DENSITY, MASS, VELOCITY
 from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, conserved, primitives
@@ -17,6 +18,9 @@ from distfsi.physics.tensors import dot
 
 # What a cell is: fluid; fluid since this step; not yet looked at; behind the wall; farther behind than fluxes look.
 FLUID, FRESH, UNKNOWN, COVERED, DEEP = range(5)
+
+# Columns of the numbers of cells of each kind that find_depth() counts.
+COVERED_CELLS, DEEP_CELLS, FRESH_CELLS = range(3)
 
 # Cells that give the flux through one face: its line of four is the middle one of five.
 BOX, LINE = 20, 8
@@ -147,6 +151,16 @@ def list_cells(begin, end, kind, occupied, shape, extent, first, covered, deep, 
 
 
 @driver
+def find_amounts(begin, end, state, volume, momentum):
+    """volume (n, 1); momentum (n, 1 + D): mass and momentum of particles of a `state` as in kernels/solid.py."""
+    for i in range(begin, end):
+        volume[i, 0] = state[i, MASS] / state[i, DENSITY]
+        momentum[i, 0] = state[i, MASS]
+        for d in static_range(DIMENSIONS):
+            momentum[i, 1 + d] = state[i, MASS] * state[i, VELOCITY + d]
+
+
+@driver
 def find_wall_velocity(
     begin, end, covered, velocity, inertia, radius, momentum, position, start, order, lower, size, low, window, strides,
     shape, spacing, origin,
@@ -206,6 +220,16 @@ def fill_fresh(begin, end, fresh, U, kind, shape, offsets, weights, rings, rest)
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
         put(U, fresh[n], cells, conserved(mean_of_fluid(U, kind, fresh[n], cells, offsets, weights, rings, rest)))
+
+
+@driver
+def find_contents(begin, end, fresh, U, shape, content):
+    """content (n, conserved) = what the cells hold per volume."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        first = fresh[n] + fresh[n] // cells * (VARIABLES - 1) * cells
+        for v in static_range(PHASES + DIMENSIONS + 1):
+            content[n, v] = load(U, first + v * cells)
 
 
 @driver

@@ -49,7 +49,9 @@ constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
 constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
 constexpr real LEAST_VOLUME = HALF;
 constexpr int HALVINGS = 80;
-static_assert(SHARED == VARIABLES * SP + FLUXES * FACES && THREADS == TILE_X * TILE_Y, "what the launch assumes");
+constexpr int KEPT = DIMENSIONS > 2 && PHASES > 1 ? 3 * FLUXES * THREADS : 0;  // what registers do not hold
+constexpr int APART = KEPT > 0 ? THREADS : 1;  // the values of a thread
+static_assert(SHARED == VARIABLES * SP + FLUXES * FACES + KEPT && THREADS == TILE_X * TILE_Y, "as the launch assumes");
 
 // P of a cell of the tile; k counts planes, of which the last SLOTS are there.
 DEVICE int cell(int i, int j, int k) { return (SLOTS > 1 ? (k + SLOTS) % SLOTS : 0) * PLANE + (j + GY) * PX + i + GHOSTS; }
@@ -202,17 +204,19 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
     const bool inside = tx < n && ty < m;
     double *out = through + t * 6 * CONSERVED;
-    real low[FLUXES], high[FLUXES], D[FLUXES];
+    real own[3 * FLUXES], *const kept = KEPT > 0 ? F + FLUXES * FACES + threadIdx.x : own;
+    // what leaves the cell, and the fluxes along z at its low and its high side
+    real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
     const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * cx, ry = sides_of_cell * cy, rz = sides_of_cell * cz;
-    long long count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
+    int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
     for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
-        if (inside) count += flux<2>(P, tx, ty, -1, rz, low, 1);
+        if (inside) count += flux<2>(P, tx, ty, -1, rz, low, APART);
         if (sides & 16) {
             if (inside)
-                for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v];
+                for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
             __syncthreads();
             for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
         }
@@ -228,7 +232,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
 #pragma unroll
             for (int v = 0; v < FLUXES; v++) {
                 const real *f = F + v * FACES + ty * ROW + tx;
-                D[v] = (f[1] - f[0]) * cx;
+                D[v * APART] = (f[1] - f[0]) * cx;
             }
         }
         for (int j = 0; j < m; j++) {
@@ -245,7 +249,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) {
                     const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
-                    D[v] = D[v] + (f[ROW] - f[0]) * cy;
+                    D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * cy;
                 }
             }
             if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
@@ -253,16 +257,17 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         }
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                count += flux<2>(P, tx, ty, k, rz, high, 1) && k < l - 1;
+                count += flux<2>(P, tx, ty, k, rz, high, APART) && k < l - 1;
 #pragma unroll
-                for (int v = 0; v < FLUXES; v++) D[v] = D[v] + (high[place(v, 2)] - low[place(v, 2)]) * cz;
+                for (int v = 0; v < FLUXES; v++)
+                    D[v * APART] = D[v * APART] + (high[place(v, 2) * APART] - low[place(v, 2) * APART]) * cz;
 #pragma unroll
-                for (int v = 0; v < FLUXES; v++) low[v] = high[v];
+                for (int v = 0; v < FLUXES; v++) low[v * APART] = high[v * APART];
             }
             if ((sides & 32) && k == l - 1) {
                 __syncthreads();
                 if (inside)
-                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v];
+                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v * APART];
                 __syncthreads();
                 for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
             }
@@ -276,10 +281,10 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                 const real volume = volumes[u - tile[BLOCK] * (VARIABLES - volumes_1) * su];
                 const real concentration = 1 / maximum(volume, LEAST_VOLUME);
 #pragma unroll
-                for (int v = 0; v < FLUXES; v++) D[v] = D[v] * concentration;
+                for (int v = 0; v < FLUXES; v++) D[v * APART] = D[v * APART] * concentration;
             }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
-            const auto divergence = tuple_of<FLUXES>(D);
+            const auto divergence = tuple_of<FLUXES>(D, APART);
             advance(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
         }
         __syncthreads();

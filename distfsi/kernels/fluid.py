@@ -311,13 +311,15 @@ STAGE_FORMULAS = (
 
 
 def stage_block(constants, arguments):
-    """A thread per column of a tile; shared memory holds fluxes and primitives of the tile, in 3D of some planes."""
+    """A thread per column of a tile. Shared memory holds primitives and fluxes of it, in 3D of some planes; of two
+    phases there also each thread's divergence and fluxes along z, which registers do not hold."""
     D = constants["DIMENSIONS"]
     px, py = int(arguments["px"]), int(arguments["py"])
     g = constants["GHOSTS"]
     x, y = px - 2 * g, py - (2 * g if D > 1 else 0)
     cells, faces = px * py * (2 * g if D > 2 else 1), (x + 1) * (y + (1 if D > 1 else 0))
-    shared = constants["VARIABLES"] * cells + constants["FLUXES"] * faces
+    kept = 3 * x * y if D > 2 and constants["PHASES"] > 1 else 0
+    shared = constants["VARIABLES"] * cells + constants["FLUXES"] * (faces + kept)
     return {"TILE_X": x, "TILE_Y": y, "THREADS": x * y, "SHARED": shared}
 
 

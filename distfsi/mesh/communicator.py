@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -122,6 +123,11 @@ class Communicator:
             return bool(ctypes.CDLL(MPI.__file__).MPIX_Query_cuda_support())
         except (OSError, AttributeError):
             return None
+
+    def pass_on(self, outgoing: Any, incoming: Any) -> None:
+        """Send the array `outgoing` to the next rank, the last one's to the first; that of the rank before arrives."""
+        after, before = (self.rank + 1) % self.size, (self.rank - 1) % self.size
+        self.world.Sendrecv(outgoing, after, recvbuf=incoming, source=before)
 
     def abort(self, code: int) -> None:
         """End all ranks at once; the launcher returns `code` where it can."""

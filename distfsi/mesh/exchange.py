@@ -28,18 +28,18 @@ class Messages:
 
     def buffer(self, variables: int, dtype: np.dtype, device: Device) -> Buffer:
         """A buffer for all messages about a field of so many variables."""
-        values = device.pinned(int(self.cells[-1]) * variables, dtype)
+        values = device.message_memory(int(self.cells[-1]) * variables, dtype)
         parts = [values[a:b] for a, b in pairwise((self.cells * variables).tolist())]
         return Buffer(values, device.beneath(values), list(zip(self.ranks.tolist(), parts, strict=True)))
 
 
 @dataclass
 class Buffer:
-    """The flat `values` of all messages on the host and on the device, and the part that is each rank's message."""
+    """The flat `values` of all messages where MPI takes them and on the device, and the part that is each rank's."""
 
-    values: np.ndarray
+    values: Any
     there: Any
-    parts: list[tuple[int, np.ndarray]]
+    parts: list[tuple[int, Any]]
 
 
 @dataclass
@@ -94,12 +94,11 @@ class GhostExchange:
         """
         plan, device = self._plan(field.shape[1], field.dtype), self.device
         flat, mirror = field.reshape(-1), device.array(mirror)
-        device.finish_beside()  # the last exchange has read what it received
-        self._requests = [self._world.Irecv(part, rank) for rank, part in plan.incoming.parts]
         with device.beside():
             self._run(plan.pack, plan.outgoing.there, flat, mirror)
             device.take(plan.outgoing.values, plan.outgoing.there)
-        device.finish_beside()
+        device.finish_beside()  # and the last exchange has read what it received
+        self._requests = [self._world.Irecv(part, rank) for rank, part in plan.incoming.parts]
         self._requests += [self._world.Isend(part, rank) for rank, part in plan.outgoing.parts]
         self._run(plan.local, flat, flat, mirror)
         if plan.inflow.count:
@@ -119,7 +118,7 @@ class GhostExchange:
     def traffic(self, field: np.ndarray) -> tuple[int, int]:
         """Bytes and messages that this rank sends in one exchange of `field`."""
         outgoing = self._plan(field.shape[1], field.dtype).outgoing
-        return outgoing.values.nbytes, len(outgoing.parts)
+        return outgoing.values.shape[0] * outgoing.values.dtype.itemsize, len(outgoing.parts)
 
     def _run(self, table: Table, destination: Any, source: Any, mirror: Any) -> None:
         self.device.run_few(self._copy, table.count, table.there, destination, source, mirror)

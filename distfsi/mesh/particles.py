@@ -36,7 +36,7 @@ class ParticleExchange:
         self._owners = device.array(blocks.owners)
         self._key: Key | None = None
         self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self.staged: Any = None  # memory of the host that the last exchange may still read
+        self.staged: Any = None  # memory that the last exchange may still read
 
     def migrate(self, columns: Columns, block: Pair | None = None) -> Pair:
         """Collective. All particles to the ranks that own their blocks, sorted by (block, id).
@@ -271,7 +271,7 @@ class GhostPlan:
         exchange, device, route = self._exchange, self._exchange.device, self._route
         if not route.leaving and not route.arriving:
             return device.empty(0)
-        leaving, arriving = (device.pinned(n * stride, np.float64) for n in (route.leaving, route.arriving))
+        leaving, arriving = (device.message_memory(n * stride, np.float64) for n in (route.leaving, route.arriving))
         there, arrived = device.beneath(leaving), device.beneath(arriving)
         with device.beside():
             for array, width, column in zip(arrays, widths, columns, strict=True):
@@ -279,7 +279,7 @@ class GhostPlan:
                 device.run(exchange.kernels.pack_rows, route.leaving, *row)
             device.take(leaving, there)
         device.finish_beside()
-        route.transfer(leaving.reshape(-1, stride), arriving.reshape(-1, stride))
+        route.transfer(leaving, arriving, stride)
         with device.beside():
             device.put(arrived, arriving)
         device.join()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 
@@ -21,15 +24,21 @@ class Route:
         self.leaving, self.arriving = len(ranks), int(arriving.sum())
 
     @staticmethod
-    def _slices(counts: np.ndarray) -> list[tuple[int, slice]]:
+    def _slices(counts: np.ndarray) -> list[tuple[int, int, int]]:
         ends = np.cumsum(counts)
-        return [(int(r), slice(ends[r] - counts[r], ends[r])) for r in np.flatnonzero(counts)]
+        return [(int(r), int(ends[r] - counts[r]), int(ends[r])) for r in np.flatnonzero(counts)]
 
-    def transfer(self, rows: np.ndarray, arrived: np.ndarray) -> None:
-        """Send `rows` (n, …); those from all others arrive in rank order, of the same type. One message per pair."""
-        requests = [self._world.Irecv(arrived[part].view(np.uint8), rank) for rank, part in self._arriving]
-        requests += [self._world.Isend(rows[part].view(np.uint8), rank) for rank, part in self._leaving]
+    def transfer(self, rows: Any, arrived: Any, width: int) -> None:
+        """Send flat `rows` of so many values each; those from all others arrive in rank order, of the same type. One
+        message per pair. Memory of a device must be at rest."""
+        parts = partial(self._parts, width=width)
+        requests = [self._world.Irecv(part, rank) for rank, part in parts(arrived, self._arriving)]
+        requests += [self._world.Isend(part, rank) for rank, part in parts(rows, self._leaving)]
         MPI.Request.Waitall(requests)
+
+    @staticmethod
+    def _parts(rows: Any, slices: list[tuple[int, int, int]], width: int) -> list[tuple[int, Any]]:
+        return [(rank, rows[first * width : end * width]) for rank, first, end in slices]
 
     def brought(self, columns: dict[str, np.ndarray]) -> np.ndarray:
         """Send the rows (n, …) of all columns as one structured array; those that arrive, as another."""
@@ -37,5 +46,5 @@ class Route:
         rows, arrived = np.empty(self.leaving, dtype), np.empty(self.arriving, dtype)
         for name, column in columns.items():
             rows[name] = column
-        self.transfer(rows, arrived)
+        self.transfer(rows.view(np.uint8), arrived.view(np.uint8), rows.itemsize)
         return arrived

@@ -240,16 +240,9 @@ class Solid:
         return self._groups.sums(values).reshape(*self.given.shape[:2], values.shape[1])
 
     @property
-    def around(self) -> dict[str, np.ndarray]:
-        """Own particles, ghosts and images as of prepare(): position, velocity, mass, density, volume, h, key."""
-        s, v = self.team.get(self._near.state), kernels.VELOCITY
-        scalars = {"mass": kernels.MASS, "density": kernels.DENSITY, "h": kernels.SMOOTHING}
-        return {
-            "position": self.team.get(self._near.position),
-            "velocity": np.ascontiguousarray(s[:, v : v + self.dimensions]),
-            "key": self._near.plan.key.here,
-            "volume": s[:, kernels.MASS] / s[:, kernels.DENSITY],
-        } | {name: np.ascontiguousarray(s[:, column]) for name, column in scalars.items()}
+    def around(self) -> Near:
+        """Own particles, ghosts and images as of prepare()."""
+        return self._near
 
     def check(self, time: float) -> None:
         """Raise Diverged, naming the particle, if one of this rank has no valid state at `time` [s]."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from distfsi import __version__
 from distfsi.device import cuda, nvrtc
 from distfsi.device.cache import cache_directory
+from distfsi.direct import refusal
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.storage import parallel_hdf5
 from distfsi.simulation import threads_of_rank
@@ -19,7 +20,7 @@ def main(communicator: Communicator) -> None:
     own = {
         "node": platform.node(),
         "threads": threads_of_rank(communicator),
-        "GPU": gpu_of_rank(communicator.local_rank),
+        "GPU": gpu_of_rank(communicator),
     }
     ranks = communicator.allgather(own)
     if communicator.rank == 0:
@@ -42,11 +43,14 @@ def report(communicator: Communicator, ranks: list[dict]) -> list[tuple[str, str
     return lines + [(f"rank {number}", place) for number, place in enumerate(places)]
 
 
-def gpu_of_rank(local_rank: int) -> str:
-    """The GPU that `run --gpu` takes on this rank, or why there is none."""
+def gpu_of_rank(communicator: Communicator) -> str:
+    """The GPU that `run --gpu` takes on this rank, and whether a message from its memory arrives; or why there is
+    none."""
     try:
-        ordinal = local_rank % cuda.gpu_count()
-        return f"GPU {ordinal}: {cuda.gpu_name(ordinal)}"
+        ordinal = communicator.local_rank % cuda.gpu_count()
+        why = refusal(communicator)
+        tried = f"no messages from its memory ({why})" if why else "a message from its memory arrives"
+        return f"GPU {ordinal}: {cuda.gpu_name(ordinal)}, {tried}"
     except cuda.NoGpu as error:
         return f"no GPU ({error})"
 
@@ -54,7 +58,8 @@ def gpu_of_rank(local_rank: int) -> str:
 def cuda_aware(communicator: Communicator) -> str:
     """Whether the MPI says that it takes memory of GPUs; runs do not need it, as messages go through the host."""
     says = {True: "says that it takes memory of GPUs", False: "does not take memory of GPUs", None: "does not tell"}
-    return f"the library {says[communicator.takes_gpu_memory()]}; messages go through pinned memory of the host"
+    default = "unless run --gpu-aware-mpi asks for it, messages go through pinned memory of the host"
+    return f"the library {says[communicator.takes_gpu_memory()]}; {default}"
 
 
 def compiler() -> str:

@@ -1,12 +1,14 @@
 """What the compiler makes of each kernel for a GPU: registers, spills, instructions. `python -m distfsi study kernels`.
 
-It needs NVRTC but no GPU. It writes gpu-kernels.csv: every kernel of the standard scenes for each architecture.
+It needs NVRTC and a C++ compiler, but no GPU. It writes gpu-kernels.csv: every kernel of all inputs, in float64 and
+float32, and of standard fluids, for each architecture; a text that several of them need stands there once.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,69 +19,77 @@ import numpy as np
 from distfsi.device import nvrtc
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
+from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.kernels.fluid import advance_tiles
+from distfsi.kernels.rows import pack_rows
 from distfsi.mesh.communicator import Communicator
+from distfsi.scene import load
 from distfsi.scene.description import Scene
-from distfsi.simulation import Simulation
+from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
 from distfsi.study import works
 
-ARCHITECTURES = ("sm_80", "sm_89", "sm_90", "sm_120")
+REALS = ("float64", "float32")
+INPUTS = Path("inputs")
+TIME_STEP = 1e-9
+STEPS_OF_DEBRIS = 8
 CELLS = {1: (256,), 2: (32, 32), 3: (16, 16, 32)}
 FLUIDS = {
     "one gas": ((works.AIR,), (1.0, 1e6), (1.0, 1e5)),
     "two gases": ((works.HELIUM, works.AIR), (1.0, 1e6), (1.0, 1e5)),
     "TNT and air": ((works.TNT, works.AIR), works.BURNT_TNT, works.AMBIENT_AIR),
 }
-BANDWIDTH = {"A100": 2.04e12, "H100": 3.35e12, "RTX 4090": 1.01e12}  # B/s, of the data sheets
+BANDWIDTH = {"sm_80": 2.04e12, "sm_89": 1.01e12, "sm_90": 3.35e12, "sm_120": 1.79e12}
+"""[B/s], of the data sheets of A100, RTX 4090, H100, RTX 5090."""
+ARCHITECTURES = tuple(BANDWIDTH)
 
 
-class Survey:
-    """A runtime that compiles nothing and runs nothing, but keeps what it is asked for."""
+class Survey(HostRuntime):
+    """A runtime that only tells which particles have moved: memory holds zeros, or what the host put there."""
+
+    RUNS = ("find_moved",)
 
     def __init__(self):
-        self.kept: list[tuple[Kernel, list[Any]]] = []
+        super().__init__(late=False)
 
-    def compile(self, kernel: Kernel, arguments: Sequence[Any]) -> None:
-        self.kept.append((kernel, list(arguments)))
+    def compile(self, kernel: Kernel, arguments: Sequence[Any]) -> HostKernel | None:
+        return super().compile(kernel, arguments) if kernel.name in self.RUNS else None
 
     def launch(self, compiled: Any, launch: Launch, count: int, arguments: Sequence[Any], queue: Queue) -> None:
-        pass
+        if compiled is not None:
+            super().launch(compiled, launch, count, arguments, queue)
 
-    def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
-        return _Memory(shape, dtype)
-
-    def zeros(self, shape: tuple[int, ...], dtype: np.dtype) -> Any:
-        return _Memory(shape, dtype)
-
-    def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
-        return np.empty(count, dtype)
-
-    def upload(self, there: Any, host: np.ndarray, queue: Queue) -> None:
-        pass
-
-    def download(self, host: np.ndarray, there: Any, queue: Queue) -> None:
-        host[...] = 0
-
-    def order(self, first: Queue, then: Queue) -> None:
-        pass
-
-    def synchronise(self, queue: Queue) -> None:
-        pass
+    def empty(self, shape: tuple[int, ...], dtype: np.dtype) -> HostArray:
+        return self.zeros(shape, dtype)
 
 
-@dataclass(frozen=True)
-class _Memory:
-    """An array without values."""
+Call = tuple[Kernel, Sequence[Any]]
+Calls = dict[tuple, Call]  # by driver and signature: a kernel, and arguments that it is called with
 
-    shape: tuple[int, ...]
-    dtype: np.dtype
 
-    @property
-    def ndim(self) -> int:
-        return len(self.shape)
+def key_of(kernel: Kernel, arguments: Sequence[Any]) -> tuple:
+    """What tells calls of one scene apart."""
+    return kernel.driver, kernel.signature(arguments)
 
-    def reshape(self, count: int) -> _Memory:
-        return _Memory((count,), self.dtype)
+
+class Inventory(Gpu):
+    """A GPU that keeps the kernels that are built for it, and what they are called with."""
+
+    def __init__(self):
+        super().__init__(Survey())
+        self.built: list[Kernel] = []
+        self.calls: Calls = {}
+
+    def build(self, *given: Any) -> SimpleNamespace:
+        kernels = super().build(*given)
+        self.built += vars(kernels).values()
+        return kernels
+
+    def run(self, kernel: Kernel, count: int, *arguments: Any) -> None:
+        self.calls.setdefault(key_of(kernel, arguments), (kernel, arguments))
+        super().run(kernel, count, *arguments)
+
+    run_few = run
 
 
 class Listening(Team):
@@ -87,7 +97,7 @@ class Listening(Team):
 
     def __init__(self):
         super().__init__(1)
-        self.kept: dict[tuple, tuple[Kernel, list[Any]]] = {}
+        self.calls: Calls = {}
 
     def build(self, drivers, constants, bindings=None, real="float64") -> SimpleNamespace:
         drivers = list(drivers)
@@ -98,7 +108,7 @@ class Listening(Team):
 
             def call(*arguments):
                 if len(arguments) > 2 and isinstance(arguments[0], int):
-                    self.kept.setdefault((kernel.name, kernel.signature(arguments[2:])), (kernel, arguments[2:]))
+                    self.calls.setdefault(key_of(kernel, arguments[2:]), (kernel, arguments[2:]))
                 return run(*arguments)
 
             return call
@@ -106,71 +116,145 @@ class Listening(Team):
         return SimpleNamespace(**{d.__name__: listening(Kernel(d, constants, bindings or {}, real)) for d in drivers})
 
 
-def fluid_kernels(scene: Scene, communicator: Communicator) -> list[tuple[Kernel, list[Any]]]:
-    """The kernels of a fluid, and arguments like those they get."""
-    survey = Survey()
-    fluid = Simulation.of(scene, communicator, device=Gpu(survey)).fluid
-    fluid.advance_stage(fluid.stages[0], 1.0)
-    fluid.fastest_signal()
-    return survey.kept
+def inventory(scene: Scene, communicator: Communicator) -> Inventory:
+    """The kernels that a scene builds, and those that a step of it calls, whatever comes out of them."""
+    gpu = Inventory()
+    simulation = Simulation.of(scene, communicator, device=gpu)
+    fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
+
+    def time_step() -> float:
+        if solid:
+            solid.time_step()
+        if coupling:
+            coupling.time_step()
+        if fluid:
+            fluid.fastest_signal()
+        return TIME_STEP
+
+    step = coupled_step if coupling else fluid_step if fluid else solid_step
+    with np.errstate(all="ignore"):
+        step(*simulation.parts, time_step)
+        simulation.watch()
+    return gpu
 
 
-def coupled_kernels(scene: Scene, communicator: Communicator) -> list[tuple[Kernel, list[Any]]]:
-    """The kernels of solid and coupling, and arguments that they got in two steps."""
+def calls_of_debris(communicator: Communicator) -> Calls:
+    """What particles call only where they fail, or near other ranks."""
     team = Listening()
-    simulation = Simulation.of(scene, communicator, device=team)
-    for _ in range(2):
+    simulation = Simulation.of(works.bursting_ball(), communicator, device=team)
+    for _ in range(STEPS_OF_DEBRIS):
         simulation.step()
-    ours = ("advance_tiles", "fastest_signals", "copy_regions")
-    return [(kernel, arguments) for kernel, arguments in team.kept.values() if kernel.name not in ours]
+    pack = Kernel(pack_rows, {}, {}, "float64")
+    arguments = (np.zeros(1, np.int64), 1, np.zeros(1), 1, 1, np.zeros(1))
+    return team.calls | {key_of(pack, arguments): (pack, arguments)}
 
 
-def rows(name: str, dimensions: int, kernels: list[tuple[Kernel, list[Any]]]) -> Iterator[dict[str, Any]]:
-    """What the compiler says of each kernel for each architecture. Raises CompileError."""
-    for kernel, arguments in kernels:
-        launch = kernel.launch(arguments)
-        for architecture in ARCHITECTURES:
-            code, log = nvrtc.compile_text(kernel.text(arguments), architecture)
-            yield {
-                "scene": name,
-                "dimensions": dimensions,
-                "kernel": kernel.name,
-                "real": kernel.real,
-                "architecture": architecture,
-                "threads": launch.threads,
-                "shared memory [B]": launch.shared,
-                **nvrtc.usage(log),
-                **nvrtc.instructions(code),
-            }
+@dataclass
+class Text:
+    """The CUDA C of a kernel, arguments that it is for, and the scenes that need it."""
+
+    kernel: Kernel
+    arguments: Sequence[Any]
+    dimensions: int
+    scenes: dict[str, None]  # in order
 
 
-def bytes_per_cell(dimensions: int, variables: int, real: str) -> float:
+def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, Text]:
+    """Each text of all kernels of all scenes, once, in the order of scenes. Raises KeyError for a kernel of which no
+    scene shows what it is called with."""
+    debris = calls_of_debris(communicator) if any(scene.solid for scene in scenes.values()) else {}
+    found = [(name, scene, inventory(scene, communicator)) for name, scene in scenes.items()]
+    known: dict[tuple[str, Callable], Calls] = {}
+    for _, scene, gpu in found:
+        for key, call in {**debris, **gpu.calls}.items():
+            known.setdefault((precision(scene), key[0]), {})[key] = call
+    texts: dict[str, Text] = {}
+    written: dict[tuple, str] = {}  # by all that a text depends on
+    for name, scene, gpu in found:
+        called = {id(kernel) for kernel, _ in gpu.calls.values()}
+        others = [kernel for kernel in gpu.built if id(kernel) not in called]
+        calls = [*gpu.calls.values()]
+        calls += [(kernel, a) for kernel in others for _, a in known[precision(scene), kernel.driver].values()]
+        for kernel, arguments in calls:
+            key = repr(kernel), kernel.signature(arguments)
+            text = written.get(key) or written.setdefault(key, kernel.text(arguments))
+            of = texts.setdefault(text, Text(kernel, arguments, scene.domain.dimensions, {}))
+            of.scenes[name] = None
+    return texts
+
+
+def precision(scene: Scene) -> str:
+    """The real type of the scene's fluid; without one that of the solid."""
+    return scene.fluid.precision if scene.fluid else "float64"
+
+
+def shipped(inputs: Path) -> dict[str, Scene]:
+    """All scenes of a folder, those with a fluid in both precisions."""
+    scenes = {}
+    for path in sorted(inputs.glob("*.toml")):
+        for real in REALS if load(path).fluid else ("",):
+            name = " ".join([path.stem, *([real] if real == "float32" else [])])
+            scenes[name] = load(path, (f"fluid.precision={real}",) if real else ())
+    return scenes
+
+
+def standard() -> dict[str, Scene]:
+    """Fluids in one, two and three dimensions."""
+    return {
+        f"{name} {D}D" + (" float32" if real == "float32" else ""): works.gases(CELLS[D], *materials, real)
+        for D in CELLS
+        for name, materials in FLUIDS.items()
+        for real in REALS
+    }
+
+
+def bytes_per_cell(constants: Mapping[str, Any], real: str) -> float:
     """Bytes that a stage moves per cell if a tile reads and writes everything once: U with ghosts, U_n, U_new."""
-    gpu = Gpu(Survey())
-    tile = np.array(gpu.tile_cells((4096,) * dimensions))
-    ghosts = float(((tile + 4) / tile).prod())
-    return variables * np.dtype(real).itemsize * (ghosts + 2.0)
+    tile = np.array(Inventory().tile_cells((4096,) * constants["DIMENSIONS"]))
+    with_ghosts = float(((tile + 2 * constants["GHOSTS"]) / tile).prod())
+    return constants["VARIABLES"] * np.dtype(real).itemsize * (with_ghosts + 2.0)
 
 
-def survey(communicator: Communicator, dimensions: Sequence[int] = (1, 2, 3)) -> Iterator[dict[str, Any]]:
-    """All rows."""
-    for D in dimensions:
-        for name, materials in FLUIDS.items():
-            for real in ("float64", "float32"):
-                yield from rows(name, D, fluid_kernels(works.gases(CELLS[D], *materials, real), communicator))
-        yield from rows("TNT, air and copper", D, coupled_kernels(works.blast_on_copper(8, D), communicator))
+def estimate(of: Text, architecture: str) -> dict[str, float | str]:
+    """Bytes of a cell in a stage, and an upper bound of the speed that follows from them: no measurement."""
+    names = ("bytes per cell", "estimate: at most so many cells per second")
+    if of.kernel.driver is not advance_tiles:
+        return dict.fromkeys(names, "")
+    size = bytes_per_cell(of.kernel.constants, of.kernel.real)
+    return dict(zip(names, (round(size, 1), f"{BANDWIDTH[architecture] / size:.2g}"), strict=True))
+
+
+def rows(text: str, of: Text, architectures: Sequence[str] = ARCHITECTURES) -> Iterator[dict[str, Any]]:
+    """What the compiler says of a text for each architecture. Raises CompileError."""
+    launch = of.kernel.launch(of.arguments)
+    for architecture in architectures:
+        code, log = nvrtc.compile_text(text, architecture)
+        yield {
+            "scenes": "; ".join(of.scenes),
+            "dimensions": of.dimensions,
+            "kernel": of.kernel.name,
+            "real": of.kernel.real,
+            "architecture": architecture,
+            "threads": launch.threads,
+            "shared memory [B]": launch.shared,
+            **nvrtc.usage(log),
+            **nvrtc.instructions(code),
+            **estimate(of, architecture),
+            "compiler": f"NVRTC {nvrtc.version()}",
+        }
 
 
 def main(communicator: Communicator, overrides: list[str]) -> None:
     """Write gpu-kernels.csv and print the stage's part of it."""
-    path = Path("gpu-kernels.csv")
-    with open(path, "w", newline="") as file:
+    path, found = Path("gpu-kernels.csv"), texts({**shipped(INPUTS), **standard()}, communicator)
+    with open(path, "w", newline="") as file, ThreadPoolExecutor() as pool:
         writer = None
-        for row in survey(communicator):
-            writer = writer or _begun(file, row)
-            writer.writerow(row)
-            if row["kernel"] == "advance_tiles":
-                print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
+        for rows_of_text in pool.map(lambda item: [*rows(*item)], found.items()):
+            for row in rows_of_text:
+                writer = writer or _begun(file, row)
+                writer.writerow(row)
+                if row["kernel"] == "advance_tiles":
+                    print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
     print(f"{path}, by NVRTC {nvrtc.version()}")
 
 

@@ -51,6 +51,17 @@ def blast_on_copper(cells: int, dimensions: int, thickness: float | None = None)
     return _endless(domain, blast.fluid, cube)
 
 
+def bursting_ball() -> scene.Scene:
+    """Half a ball of bonded particles that flies apart at a symmetry plane: bonds are cut, there is debris."""
+    failure = scene.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, 2e8, 0.0, scene.Scatter(10.0, 0.1, 1))
+    eos, strength = scene.LinearEos(3.25e9), scene.PerfectlyPlastic(0.7e9, 2e7)
+    rest, shape = (0.0,) * 3, scene.Ball((0.0,) * 3, 0.4)
+    ball = scene.Body("ball", shape, 0.1, 2000.0, rest, eos, strength, None, failure, radial_velocity=300.0)
+    sides = (("outflow", "outflow"),) * 2 + (("symmetry", "outflow"),)
+    domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, sides)
+    return _endless(domain, None, scene.Solid((ball,), SMOOTHING, 1.0, 2.0))
+
+
 def _cube(
     lower: tuple[float, ...], sides: tuple[float, ...], form: scene.SolidForm = "updated_lagrangian"
 ) -> scene.Solid:
