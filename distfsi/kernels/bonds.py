@@ -15,6 +15,7 @@ from distfsi.physics.bonds import (
     bond_stress,
     bulk_viscosity,
     is_other_face,
+    largest_stretch,
     least_stretch,
     most_stretched,
     signal_time,
@@ -30,7 +31,8 @@ from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigen
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
 # Columns of `facts`: what ghosts are told besides.
-VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, CRACK = range(8)
+VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, STRETCH, CRACK = range(9)
+OPENED = 0.5  # spacings: an opening that neither end of a bond sees as its own stretch
 SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
 
@@ -180,6 +182,9 @@ def crack(
 def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, partner, bond, parted, lost):
     """Cut the stretched bonds that cross a crack or whose ends have failed otherwise, and those of a loose particle.
 
+    A bond between damaged particles that is half a spacing longer than the stretch of either makes it crosses a crack
+    as well, one that has no face at its ends: where it jumps from one row of particles to another.
+
     lost[i] = how many bonds particle i has lost; the others keep their order. parted[i] = length of the shortest that
     it has ever lost.
     """
@@ -194,7 +199,9 @@ def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, 
             crossed = max(ahead, behind) > 0.5 * spacing[body[i]] or (faces and min(ahead, behind) > 0.0)
             failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and faces
             stretched = dot(x, x) > dot(X, X)
-            if not (((crossed or failed) and stretched) or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
+            widest = max(facts[i, STRETCH], facts[j, STRETCH]) * sqrt(dot(X, X)) + OPENED * spacing[body[i]]
+            opened = min(facts[i, DAMAGE], facts[j, DAMAGE]) > 0.0 and dot(x, x) > widest * widest
+            if not (((crossed or failed) and stretched) or opened or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
                 if kept < n:
                     key[i, kept] = key[i, n]
                     partner[i, kept] = j
@@ -259,7 +266,7 @@ def mark_debris(begin, end, facts, mark):
 
 
 @driver
-def tell(begin, end, volume, body, loose, exposed, bond_count, parted, crack, damage, facts):
+def tell(begin, end, volume, body, loose, exposed, bond_count, parted, deformation, crack, damage, facts):
     """facts[i] = what others must know of a particle, in the columns above."""
     for i in range(begin, end):
         facts[i, VOLUME] = volume[i]
@@ -269,6 +276,7 @@ def tell(begin, end, volume, body, loose, exposed, bond_count, parted, crack, da
         facts[i, EXPOSED] = 1.0 if exposed[i] > 0 else 0.0
         facts[i, DEBRIS] = 1.0 if bond_count[i] == 0 else 0.0
         facts[i, PARTED] = parted[i]
+        facts[i, STRETCH] = largest_stretch(matrix_of(deformation, i)) if FAILS else 1.0
         for d in static_range(DIMENSIONS):
             facts[i, CRACK + d] = crack[i, d]
 

@@ -102,6 +102,14 @@ def least_stretch(deformation):
     return 1.0 / sqrt(mean + sqrt(spread * (DIMENSIONS - 1.0)))
 
 
+def largest_stretch(deformation):
+    """Upper bound of the principal stretches, exact in one and two dimensions (as least_stretch)."""
+    squared = product(transposed(deformation), deformation)
+    mean = trace(squared) * (1.0 / DIMENSIONS)
+    spread = max(trace(product(squared, squared)) * (1.0 / DIMENSIONS) - mean * mean, 0.0)
+    return sqrt(mean + sqrt(spread * (DIMENSIONS - 1.0)))
+
+
 def signal_time(shortest, sound_speed, viscous_pressure, density):
     """Longest step [s] that signals allow, with safety 0.3; `shortest` [m]: h along the most compressed direction."""
     signal = sound_speed + viscous_pressure / (density * sound_speed)
