@@ -97,4 +97,4 @@ def test_johnson_cook_call_by_call(monkeypatch):
     calls = steps_side_by_side(
         monkeypatch, ROOT / "inputs/steel_tube.toml", 4, ("domain.cells=[32, 32]", "solid.bodies.tube.spacing=1 mm")
     )
-    assert calls["deform"] == 5
+    assert calls["deform"] >= 5
