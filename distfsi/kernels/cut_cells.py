@@ -99,6 +99,14 @@ def add_content(total, U, swept, fraction, at, cells):
 
 
 @driver
+def mark_leaving(begin, end, band, mark, kind, master, shape, steps):
+    """mark[n] = 1 where a cell of the band is shut and its fluid can go, else 0."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        mark[n] = 1 if kind[band[n]] == SHUT and way_to_master(master, band[n], cells, steps) != 0 else 0
+
+
+@driver
 def evict(begin, end, band, moved, U, swept, kind, fraction, master, steps, shape):
     """moved (n, VARIABLES + 3) = contents, phase energies and volumes of the band's cells after those that are shut
     have handed theirs to a neighbour."""
@@ -129,7 +137,32 @@ def put_moved(begin, end, band, moved, U, swept, shape):
 
 
 @driver
-def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, shape, origin, grid_cells):
+def look_around(begin, end, band, joined, above, master, offsets, steps, shape, origin, grid_cells):
+    """joined (n, offsets) = 1 where the cell at an offset from a cell's master, or from the cell if it has none, has
+    joined the same; above (n, D) = the place in the band of the next cell along each axis, -1 for none."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        at = band[n]
+        center = at + way_to_master(master, at, cells, steps)
+        index, first = index_of(center, shape, origin), center + at // cells * (DIMENSIONS - 1) * cells
+        for m in range(len(offsets)):
+            there, same = first + step_to(offsets, m, steps), is_in_domain(index, offsets[m], grid_cells)
+            for d in static_range(DIMENSIONS):
+                same = same and master[there + d * cells] == -offsets[m, d]
+            joined[n, m] = 1 if same else 0
+        for axis in range(DIMENSIONS):
+            first, last = n, len(band)
+            while last - first > 1:
+                middle = (first + last) // 2
+                if band[middle] <= at + steps[axis]:
+                    first = middle
+                else:
+                    last = middle
+            above[n, axis] = first if band[first] == at + steps[axis] else -1
+
+
+@driver
+def mix(begin, end, band, joined, mixed, U, swept, fraction, master, offsets, steps, shape):
     """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs."""
     cells = shape[0] * shape[1] * shape[2]
     total = workspace(VARIABLES + 4)
@@ -139,21 +172,17 @@ def mix(begin, end, band, mixed, U, swept, fraction, master, offsets, steps, sha
         for v in range(VARIABLES + 4):
             total[v] = 0.0
         add_content(total, U, swept, fraction, center, cells)
-        joined = center != at
-        index = index_of(center, shape, origin)
+        shares = center != at
         for m in range(len(offsets)):
-            if is_in_domain(index, offsets[m], grid_cells):
-                step = step_to(offsets, m, steps)
-                way = way_to_master(master, center + step, cells, steps)
-                if way != 0 and way == -step:
-                    joined = True
-                    add_content(total, U, swept, fraction, center + step, cells)
+            if joined[n, m] > 0:
+                shares = True
+                add_content(total, U, swept, fraction, center + step_to(offsets, m, steps), cells)
         volume = max(total[VARIABLES + 2], SEALED)
         Q = tuple(total[v] for v in static_range(VARIABLES + 2))
         state = state_of(Q, volume)
         for v in static_range(VARIABLES):
             mixed[n, v] = state[v]
-        mixed[n, VARIABLES] = volume * (load(fraction, at) / total[VARIABLES + 3] if joined else 1.0)
+        mixed[n, VARIABLES] = volume * (load(fraction, at) / total[VARIABLES + 3] if shares else 1.0)
 
 
 @driver
@@ -215,17 +244,36 @@ def find_walls(begin, end, band, area, kind, old, new, shape, steps, spacing):
 
 
 @driver
+def find_fluxes(begin, end, band, above, flux, U, kind, old, new, shape, steps, rates):
+    """flux (n, 2 D FLUXES) = what passes the low face of a cell along each axis, and its high face unless the cell
+    `above` (n, D) it is in the band too; of faces that are open."""
+    cells = shape[0] * shape[1] * shape[2]
+    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
+    for n in range(begin, end):
+        for axis in range(DIMENSIONS):
+            step = steps[axis]
+            for side in range(2 if above[n, axis] < 0 else 1):
+                here = band[n] + (side - 1) * step
+                if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
+                    look_at_face(U, here, cells, steps, axis, P, T)
+                    see_wall(kind, old, new, here, cells, step, axis, T)
+                    flux_of_face(P, T, F, rates, axis)
+                    for v in range(FLUXES):
+                        flux[n, (2 * axis + side) * FLUXES + v] = load(F, 2 * place(v, axis))
+
+
+@driver
 def advance_band(
-    begin, end, band, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new, shape, steps,
-    rates, b, dt, weight,
+    begin, end, band, above, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new,
+    shape, steps, rates, b, dt, weight,
 ):  # fmt: skip
-    """One stage of the band's cells: U_new and swept = their contents.
+    """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents.
 
     start_volume (n,): of the fluid before the step. area, velocity (n, D): of the wall; impulse (n, D) [N s/m3] and
     work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
     """
     cells = shape[0] * shape[1] * shape[2]
-    P, T, F, D = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2), workspace(FLUXES)
+    D = workspace(FLUXES)
     for n in range(begin, end):
         at = band[n]
         for v in range(FLUXES):
@@ -233,14 +281,13 @@ def advance_band(
         for axis in range(DIMENSIONS):
             step = steps[axis]
             for side in range(2):
-                here = at + (side - 1) * step
-                if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
-                    look_at_face(U, here, cells, steps, axis, P, T)
-                    between = see_wall(kind, old, new, here, cells, step, axis, T)
-                    flux_of_face(P, T, F, rates, axis)
+                between = open_between(kind, old, new, at + side * step, axis, step, cells)
+                if between > 0.0:
                     rate = (2 * side - 1) * rates[axis] * between
+                    shared = side == 1 and above[n, axis] >= 0
+                    m, first = (above[n, axis] if shared else n), (2 * axis + (0 if shared else side)) * FLUXES
                     for v in range(FLUXES):
-                        D[v] += rate * load(F, 2 * place(v, axis))
+                        D[v] += rate * flux[m, first + v]
         now = state_at(U, at, cells)
         surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
         wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))

@@ -9,8 +9,8 @@ from math import sqrt
 from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import center_of
-from distfsi.kernels.cut_cells import index_of, share_at, way_to_master
-from distfsi.kernels.cut_geometry import is_in_domain, step_to
+from distfsi.kernels.cut_cells import share_at, way_to_master
+from distfsi.kernels.cut_geometry import step_to
 from distfsi.kernels.gather import sum_particles
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
@@ -141,7 +141,7 @@ def find_debts(begin, end, band, debt, impulse, excess):
 
 
 @driver
-def pay_debts(begin, end, band, paid, debt, U, swept, master, offsets, steps, shape, origin, grid_cells):
+def pay_debts(begin, end, band, joined, paid, debt, U, swept, master, offsets, steps, shape):
     """Masters pay out of their energy for themselves and for those that joined them; paid (n,) [J/m3] of the cell."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
@@ -149,13 +149,9 @@ def pay_debts(begin, end, band, paid, debt, U, swept, master, offsets, steps, sh
         paid[n] = 0.0
         if way_to_master(master, at, cells, steps) == 0:
             owed = load(debt, at)
-            index = index_of(at, shape, origin)
             for m in range(len(offsets)):
-                if is_in_domain(index, offsets[m], grid_cells):
-                    step = step_to(offsets, m, steps)
-                    way = way_to_master(master, at + step, cells, steps)
-                    if way != 0 and way == -step:
-                        owed += load(debt, at + step)
+                if joined[n, m] > 0:
+                    owed += load(debt, at + step_to(offsets, m, steps))
             energy = at + (at // cells * (VARIABLES - 1) + PHASES + DIMENSIONS) * cells
             paid[n] = owed
             store(U, energy, load(U, energy) - owed / load(swept, share_at(at, cells)))

@@ -48,9 +48,11 @@ def thicken(
 ):  # fmt: skip
     """ball[p] = radius [m] of a particle's ball: `ball_radius` in a body so thin that no kernel nearby is filled."""
     for p in range(begin, end):
+        ball[p], most = 0.0, filled[p]
+        if most >= FILLED or volume[p, 0] <= 0.0:
+            continue
         x = tuple(position[p, d] for d in static_range(DIMENSIONS))
         bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
-        most = filled[p]
         for k in range(bz[0], bz[1]):
             for j in range(by[0], by[1]):
                 row = k * strides[2] + j * strides[1]
@@ -59,7 +61,7 @@ def thicken(
                     dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
                     if dot(dx, dx) < radius * radius:
                         most = max(most, filled[q])
-        ball[p] = ball_radius * min(max((FILLED - most) / FADING, 0.0), 1.0) if volume[p, 0] > 0.0 else 0.0
+        ball[p] = ball_radius * min(max((FILLED - most) / FADING, 0.0), 1.0)
 
 
 @helper
@@ -181,11 +183,21 @@ def open_up(begin, end, near, distance, before, fraction, aperture, shape, exten
                 distance[c + uz * sz + uy * sy],
                 distance[c + uz * sz + uy * sy + 1],
             )
+            face = at + b * (DIMENSIONS - 1) * cells
+            least, most = d[0], d[0]
+            for c in static_range(1, 8):
+                least, most = min(least, d[c]), max(most, d[c])
+            if least > 0.0 or most <= 0.0:
+                part = 1.0 if least > 0.0 else 0.0
+                fraction[at] = part
+                for axis in static_range(DIMENSIONS):
+                    aperture[face + axis * cells] = part
+                if min(part, before[at]) < 1.0:
+                    is_cut[r] = 1
+                continue
             part = open_cell(d)
             fraction[at] = part if part > 1e-9 else 0.0
-            if min(part, before[at]) < 1.0:
-                is_cut[r] = 1
-            face = at + b * (DIMENSIONS - 1) * cells
+            is_cut[r] = 1
             aperture[face] = open_face((d[0], d[2], d[4], d[6]))
             if DIMENSIONS > 1:
                 aperture[face + cells] = open_face((d[0], d[1], d[4], d[5]))

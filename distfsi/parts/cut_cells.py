@@ -45,12 +45,15 @@ PARTICLE_DRIVERS = (
 )
 FLUID_DRIVERS = (
     kernels.take_contents,
+    kernels.mark_leaving,
     kernels.evict,
     kernels.put_moved,
+    kernels.look_around,
     kernels.mix,
     kernels.put_mixed,
     kernels.put_rest,
     kernels.find_walls,
+    kernels.find_fluxes,
     kernels.advance_band,
     kernels.exchange_volumes,
     kernels.book_sides,
@@ -183,9 +186,13 @@ class CutCells:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
         rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
         rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
+        flux = self.team.empty((self._band.shape[0], 2 * self._dimensions * self.model.constants["FLUXES"]))
+        seen = (self._above, flux)
+        self._run(self.fluid_kernels.find_fluxes, *seen, self._input, *self._walls, rates)
         self._run(
-            self.fluid_kernels.advance_band, self._start, self._input, self._output, self._swept, self._start_volume,
-            self._area, self._velocity, self._impulse, self._work, *self._walls, rates, stage.b, dt, weight,
+            self.fluid_kernels.advance_band, *seen, self._start, self._input, self._output, self._swept,
+            self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates, stage.b, dt,
+            weight,
         )  # fmt: skip
         self.team.run(
             self.fluid_kernels.book_sides, self._near_sides.shape[0], self._near_sides, *self._sides,
@@ -238,8 +245,7 @@ class CutCells:
         self._run(self.kernels.find_debts, debt, self._impulse, mean)
         self._exchange(self._debt, np.array([-1]), 0.0)
         self._run(
-            self.fluid_kernels.pay_debts, paid, debt, self.fluid.there, self._swept, self._masters, wall.offsets,
-            wall.steps, wall.shape, wall.origin, wall.cells,
+            self.fluid_kernels.pay_debts, self._joined, paid, debt, self.fluid.there, self._swept, *self._company
         )  # fmt: skip
         self._run(self.kernels.clear, 1, debt, wall.shape)
         impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self._impulse, self._work, paid))
@@ -300,12 +306,16 @@ class CutCells:
         self.wall.find_refuges(self._kinds, self._masters)
         self._exchange(self._master, np.arange(self._dimensions), 0)
         self._keep_lists(*self.wall.lists(self._kinds, self._swept, self._fields))
-        self._evict()
+        self._run(self.fluid_kernels.take_contents, self.fluid.there, self._swept, self.wall.shape)
+        mark = self.team.empty(self._band.shape[0], np.int8)
+        self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
+        if self.blocks.communicator.maximum(np.array([float(self._particles.rows.any(mark))]))[0] > 0.0:
+            self._evict()
+        self._look_around()
 
     def _evict(self) -> None:
-        """Collective. States of the band become contents; those of cells that are shut move, and these are covered."""
+        """Collective. Contents of cells that are shut move, and these are covered."""
         U, wall, k = self.fluid.there, self.wall, self.fluid_kernels
-        self._run(k.take_contents, U, self._swept, wall.shape)
         self._exchange_state(U)
         self._exchange_swept()
         moved = self.team.empty((self._band.shape[0], self.model.variables + 3), U.dtype)
@@ -315,6 +325,14 @@ class CutCells:
         self._run(k.put_moved, moved, U, self._swept, wall.shape)
         wall.cover_evicted(self._kinds, self._masters)
         self._keep_lists(*wall.lists(self._kinds, self._swept, self._fields))
+
+    def _look_around(self) -> None:
+        """Which cells around the band's belong together, and which of the band are next to each other."""
+        wall, count, D = self.wall, self._band.shape[0], self._dimensions
+        self._joined = self.team.empty((count, wall.offsets.shape[0]), np.int8)
+        self._above = self.team.empty((count, D), np.int64)
+        given = (self._masters, wall.offsets, wall.steps, wall.shape, wall.origin, wall.cells)
+        self._run(self.fluid_kernels.look_around, self._joined, self._above, *given)
 
     def _keep_lists(self, lists: list[Any], counts: np.ndarray) -> None:
         self._band, self._covered, self._loose = lists
@@ -336,10 +354,7 @@ class CutCells:
         self._exchange_state(U)
         self._exchange_swept()
         wall, k, mixed = self.wall, self.fluid_kernels, self._mixed(self._band)
-        self._run(
-            k.mix, mixed, U, self._swept, fraction, self._masters, wall.offsets, wall.steps, wall.shape, wall.origin,
-            wall.cells,
-        )  # fmt: skip
+        self._run(k.mix, self._joined, mixed, U, self._swept, fraction, *self._company)
         self._run(k.put_mixed, mixed, U, self._swept, wall.shape)
         rest = (self._covered, U, self._swept, self._rest_there, wall.shape)
         self.team.run(k.put_rest, self._covered.shape[0], *rest)
@@ -367,6 +382,11 @@ class CutCells:
     def _walls(self) -> tuple[Any, ...]:
         """What decides how open a face is."""
         return self._kinds, *self.wall.faces, self.wall.shape, self.wall.steps
+
+    @property
+    def _company(self) -> tuple[Any, ...]:
+        """What tells where masters and other neighbours are."""
+        return self._masters, self.wall.offsets, self.wall.steps, self.wall.shape
 
     def _exchange(self, field: Any, mirror: np.ndarray, inflow: float) -> None:
         self.exchange.start(field, mirror, np.full((3, 2, field.shape[1]), inflow))
