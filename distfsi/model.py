@@ -129,7 +129,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "SHARPENED": phases == 2 and (fluid.sharpening or curved),
         "CURVED": curved,
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
-        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme == "cut_cells",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
     } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}

@@ -42,7 +42,7 @@ from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 
-COUPLINGS = {"cut_cells": CutCells, "paper": Coupling}
+COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": Coupling}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 STEPS_BETWEEN_DEALS = 100
 

@@ -203,6 +203,24 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
     assert all(np.abs(made).max() < 1e-13 for made in case.coupling.ledger().values())
 
 
+def test_stairs_keep_uniform_flow_and_all_books():
+    """Whole cells only, as a scheme to compare with."""
+    n, u = 24, (1.0, 0.5)
+    ball, method = rigid(Ball((0.4, 0.4), 0.2), 0.5 / n, u), {"scheme": "stairs", "cfl": 0.5}
+    carried = Coupled([ball], [(gas(1.4, 1.0, u), None)], (0.0, 0.0), (1.0, 1.0), (n, n), (OPEN,) * 2, **method)
+    ball = body(Ball((0.5, 0.4), 0.2), 0.025, 3.0, (0.7, 0.3))
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 5.0, (0, 0)), Box((0.0, 0.0), (0.2, 0.2)))]
+    thrown = Coupled([ball], regions, (0.0, 0.0), (1.2, 0.8), (24, 16), **method)
+    before = thrown.balance()
+    for _ in range(15):
+        carried.step()
+        thrown.step()
+    W, parts = primitives(carried)[:, volumes(carried) > 0.0], thrown.coupling.wall.fractions[1].here()
+    assert np.abs(W[3] - 1.0).max() < 1e-12 and np.abs(W[1:3] - np.array(u)[:, None]).max() < 1e-12
+    assert np.isin(parts, (0.0, 1.0)).all() and (parts == 0.0).any()
+    assert np.abs(thrown.balance() - before).max() < 1e-12 * before.max()
+
+
 # ---- thin plates ----------------------------------------------------------------------------------------------------
 
 

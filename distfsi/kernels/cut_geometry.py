@@ -206,6 +206,28 @@ def open_up(begin, end, near, distance, before, fraction, aperture, shape, exten
 
 
 @driver
+def round_parts(begin, end, near, fraction, shape):
+    """fraction = that of stairs in `near` blocks: a cell is open as a whole or not at all. An item is a row of cells,
+    ghosts included."""
+    for r in range(begin, end):
+        for at in range(r * shape[2], (r + 1) * shape[2] if near[r // (shape[0] * shape[1])] > 0 else r * shape[2]):
+            fraction[at] = 1.0 if fraction[at] >= 0.5 else 0.0
+
+
+@driver
+def close_stairs(begin, end, near, fraction, aperture, shape, steps):
+    """aperture = that of stairs in `near` blocks: a face is open between open cells only."""
+    cells = shape[0] * shape[1] * shape[2]
+    for r in range(begin, end):
+        b = r // (shape[0] * shape[1])
+        for at in range(r * shape[2], (r + 1) * shape[2] if near[b] > 0 else r * shape[2]):
+            for axis in range(DIMENSIONS):
+                before = max(at - steps[axis], b * cells)
+                face = at + (b * (DIMENSIONS - 1) + axis) * cells
+                aperture[face] = min(load(fraction, at), load(fraction, before))
+
+
+@driver
 def mark_cut_blocks(begin, end, near, is_cut, rows):
     """near (blocks,) = CUT where one of a block's `rows` is."""
     for b in range(begin, end):

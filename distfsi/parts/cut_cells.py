@@ -82,7 +82,9 @@ class CutCells:
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         real = np.dtype(scene.fluid.precision).type
-        self.wall = WallGeometry(blocks, team, max(body.spacing for body in scene.solid.bodies), real)
+        self.wall = WallGeometry(
+            blocks, team, max(body.spacing for body in scene.solid.bodies), real, scene.coupling.scheme == "stairs"
+        )
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
         self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)

@@ -29,6 +29,8 @@ DRIVERS = (
     kernels.find_near,
     kernels.find_distances,
     kernels.open_up,
+    kernels.round_parts,
+    kernels.close_stairs,
     kernels.mark_cut_blocks,
     kernels.find_masters,
     kernels.find_refuges,
@@ -66,8 +68,9 @@ class WallGeometry:
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
     """
 
-    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type):
-        """`spacing` [m] of the coarsest particles."""
+    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type, stairs: bool):
+        """`spacing` [m] of the coarsest particles; `stairs`: cells are open as a whole or not at all."""
+        self._stairs = stairs
         self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
         self.kernels: SimpleNamespace = team.build(DRIVERS, {"DIMENSIONS": D})
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
@@ -135,6 +138,9 @@ class WallGeometry:
         run(
             k.open_up, self._count, near, self._corners, before, after, self.faces[1], self.shape, self.extent, is_cut
         )  # fmt: skip
+        if self._stairs:
+            run(k.round_parts, self._count, near, after, self.shape)
+            run(k.close_stairs, self._count, near, after, self.faces[1], self.shape, self.steps)
         run(k.mark_cut_blocks, count, near, is_cut, prod(self.blocks.shape[:2]))
 
     @property

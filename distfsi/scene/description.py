@@ -16,7 +16,7 @@ TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
-CouplingScheme = Literal["cut_cells", "paper"]
+CouplingScheme = Literal["cut_cells", "stairs", "paper"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
 

@@ -268,7 +268,8 @@ class CouplingInput(Table):
 
     scheme: description.CouplingScheme = Field(
         "cut_cells",
-        description='"cut_cells": conservative, tight and quiet; "paper": covered cells copy the fluid',
+        description='"cut_cells": conservative, tight and quiet; "stairs": the same with whole cells only, to compare '
+        'with: its forces on oblique walls are rough; "paper": covered cells copy the fluid',
     )
     sub_steps: Annotated[int, Field(strict=True, ge=1)] = Field(
         8,

@@ -11,7 +11,7 @@ from distfsi.study.couplings import FREE_PLATE, PISTON, PROBLEMS, Problem
 from distfsi.study.frontier import Frontier
 
 DIRECTORY = Path("out/study_frontier_coupling")
-SCHEMES, PER_CELL = {"cut cells": "cut_cells", "paper": "paper"}, (1.4, 2.0, 4.0)
+SCHEMES, PER_CELL = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}, (1.4, 2.0, 4.0)
 VARIANTS = {f"{name}, {n:g} per cell": (scheme, n) for name, scheme in SCHEMES.items() for n in PER_CELL}
 
 

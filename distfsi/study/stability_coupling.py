@@ -40,7 +40,7 @@ from distfsi.study.references import AIR, STEEL, STEEL_DENSITY, WATER
 from distfsi.study.stability import Map, Stability, Verdict, corners
 
 DIRECTORY = Path("out/study_stability_coupling")
-SCHEMES = {"cut cells": "cut_cells", "paper": "paper"}
+SCHEMES = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}
 SURVIVED, RANG, LEAKED, FAILED = range(4)
 VERDICTS = {"survived": "tab:green", "rang": "tab:olive", "leaked": "tab:orange", "failed": "tab:red"}
 CFL = (0.1, 0.5, 0.9)
@@ -166,5 +166,5 @@ def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
-    """Run both schemes on all maps; leave a CSV file and a sheet per map in DIRECTORY."""
+    """Run all schemes on all maps; leave a CSV file and a sheet per map in DIRECTORY."""
     STUDY.run(communicator, SCHEMES, MAPS, overrides)
