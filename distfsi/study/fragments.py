@@ -37,7 +37,7 @@ from distfsi.scene.description import (
 from distfsi.simulation import Simulation
 
 DIRECTORY = Path("out/study_fragments")
-RADIUS, DENSITY, YIELD = 32e-3, 2700.0, 300e6  # m, kg/m3, Pa; aluminium without hardening
+RADIUS, DENSITY, YIELD = 64e-3, 2700.0, 300e6  # m, kg/m3, Pa; aluminium without hardening
 EOS, STRENGTH = LinearEos(68.6e9), PerfectlyPlastic(26.3e9, YIELD)
 PLANE_YIELD = 2.0 / math.sqrt(3.0) * YIELD  # of plane strain
 RATES = tuple(1e4 * 10.0 ** (0.25 * k) for k in range(5))  # 1/s
@@ -149,7 +149,7 @@ def sizes(law: Law, rates: Sequence[float], seeds: int, finer: int = 1) -> Sizes
 
 def whole_without_failure() -> tuple[int, float]:
     """Pieces of a ring that cannot fail at a strain of 100 %, and the relative spread of its plastic strain."""
-    simulation = ring(1e4, 1e-3, ROWS, None)
+    simulation = ring(1e4, RADIUS / 32.0, ROWS, None)
     expand(simulation, 1e4, 1.0)
     strain = simulation.solid.columns["plastic_strain"]
     return len(simulation.solid.pieces()["piece"]), float(strain.std() / strain.mean())

@@ -144,15 +144,15 @@ SPEEDS = (100.0, 300.0, 1000.0, 2000.0, 3000.0)
 MAPS = (
     Map(
         "tension", "Copper plate stretched without failure", "strain", (0.1, 0.3, 0.6, 1.0, 2.0),
-        "particles through the thickness", (1.0, 2.0, 4.0, 8.0), stretched,
+        "particles across", (1.0, 2.0, 4.0, 8.0), stretched,
     ),
     Map(
         "step", "Copper plates meet", "speed [m/s]", SPEEDS,
-        "time step over the stable one of 0.3 h/c", tuple(f / 0.3 for f in FACTORS), impact,
+        "time step over 0.3 h/c", tuple(f / 0.3 for f in FACTORS), impact,
     ),
     Map(
         "thickness", "Copper plates meet", "speed [m/s]", SPEEDS,
-        "particles through the thickness", (1.0, 2.0, 4.0, 8.0), thin,
+        "particles across", (1.0, 2.0, 4.0, 8.0), thin,
     ),
 )  # fmt: skip
 
