@@ -188,6 +188,8 @@ DEVICE double logarithm(double x) { return log(x); }
 DEVICE float logarithm(float x) { return logf(x); }
 DEVICE double power(double x, double y) { return pow(x, y); }
 DEVICE float power(float x, float y) { return powf(x, y); }
+DEVICE double power(double x, float y) { return pow(x, (double)y); }
+DEVICE double power(float x, double y) { return pow((double)x, y); }
 DEVICE integer floored(double x) { return (long long)floor(x); }
 DEVICE integer floored(float x) { return (long long)floorf(x); }
 DEVICE integer truncated(double x) { return (long long)x; }
