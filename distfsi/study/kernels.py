@@ -122,18 +122,20 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     simulation = Simulation.of(scene, communicator, device=gpu)
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
 
-    def time_step() -> float:
+    def time_step() -> tuple[float, int]:
         if solid:
             solid.time_step()
         if coupling:
             coupling.time_step()
         if fluid:
             fluid.fastest_signal()
-        return TIME_STEP
+        return TIME_STEP, 2
 
     step = coupled_step if coupling else fluid_step if fluid else solid_step
     with np.errstate(all="ignore"):
         step(*simulation.parts, time_step)
+        if coupling and scene.coupling.scheme == "cut_cells":
+            coupling.pressure(TIME_STEP)
         simulation.watch()
     return gpu
 
