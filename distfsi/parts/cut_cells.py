@@ -312,10 +312,10 @@ class CutCells:
         mark = self.team.empty(self._band.shape[0], np.int8)
         self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
         if self.blocks.communicator.maximum(np.array([float(self._particles.rows.any(mark))]))[0] > 0.0:
-            self._evict()
+            self.evict()
         self._look_around()
 
-    def _evict(self) -> None:
+    def evict(self) -> None:
         """Collective. Contents of cells that are shut move, and these are covered."""
         U, wall, k = self.fluid.there, self.wall, self.fluid_kernels
         self._exchange_state(U)

@@ -29,8 +29,6 @@ DRIVERS = (
     kernels.find_near,
     kernels.find_distances,
     kernels.open_up,
-    kernels.round_parts,
-    kernels.close_stairs,
     kernels.mark_cut_blocks,
     kernels.find_masters,
     kernels.find_refuges,
@@ -42,6 +40,7 @@ DRIVERS = (
     count_marked,
     list_marked,
 )
+STAIRS = (kernels.round_parts, kernels.close_stairs)
 
 
 def plane_profile(dimensions: int, points: int = PROFILE_POINTS) -> np.ndarray:
@@ -72,7 +71,7 @@ class WallGeometry:
         """`spacing` [m] of the coarsest particles; `stairs`: cells are open as a whole or not at all."""
         self._stairs = stairs
         self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
-        self.kernels: SimpleNamespace = team.build(DRIVERS, {"DIMENSIONS": D})
+        self.kernels: SimpleNamespace = team.build((*DRIVERS, *(STAIRS if stairs else ())), {"DIMENSIONS": D})
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
         self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + 0.05 * h

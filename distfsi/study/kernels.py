@@ -136,6 +136,7 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
         step(*simulation.parts, time_step)
         if coupling and scene.coupling.scheme == "cut_cells":
             coupling.pressure(TIME_STEP)
+            coupling.evict()
         simulation.watch()
     return gpu
 
