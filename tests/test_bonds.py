@@ -355,6 +355,19 @@ def test_a_spring_that_was_never_pressed_does_not_push():
     assert np.abs(part._acceleration).max() > 0.0
 
 
+@pytest.mark.parametrize(("damage", "pieces"), [(0.0, 1), (0.5, 2)])
+def test_an_opening_that_no_particle_sees_as_its_stretch_is_a_crack(damage, pieces):
+    """Among damaged particles: where a crack jumps from one row to another, none of them has failed."""
+    part = failed_block(COPPER_EOS)
+    c = part.columns
+    c["damage"][:] = damage
+    c["damage"][0] = 1.0  # elsewhere
+    c["position"][:, 0] += np.where(c["reference"][:, 0] > 0.0, 2.5e-3, 0.0)
+    part.prepare()
+    found = part.pieces()["particles"]
+    assert (found > 1).sum() == pieces
+
+
 def test_rubber_rings_meet_part_and_do_not_break():
     speed, spacing = 0.059 * 57.03, 0.0025
     rings = [
