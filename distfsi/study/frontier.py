@@ -64,8 +64,11 @@ class Frontier:
         started = clock.process_time()
         try:
             figures = tuple(problem.measure(simulation))
-        except (Diverged, IndexError) as error:  # an index error: what is measured did not happen
+        except Diverged as error:
             return Outcome(variant, spacing, particles, simulation.steps, np.nan, (), str(error).splitlines()[0])
+        except IndexError:
+            why = "what is measured did not happen by the end"
+            return Outcome(variant, spacing, particles, simulation.steps, np.nan, (), why)
         return Outcome(variant, spacing, particles, simulation.steps, clock.process_time() - started, figures)
 
     def run(
