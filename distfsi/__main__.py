@@ -129,14 +129,14 @@ def _quantity(text: str, unit: str) -> float:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run a scene."""
-    from distfsi import simulation
+    from distfsi.run import run
     from distfsi.scene import load
 
     communicator = _start_ranks()
     with _telling_once(communicator):
         scene = _load_once(load, arguments, communicator)
         gpus = arguments.gpu, arguments.gpu_aware_mpi
-        simulation.run(scene, communicator, arguments.threads, arguments.restart, *gpus)
+        run(scene, communicator, arguments.threads, arguments.restart, *gpus)
 
 
 def check(arguments: argparse.Namespace) -> None:

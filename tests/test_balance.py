@@ -14,17 +14,17 @@ TUBE = ["domain.cells=[64, 64]", "solid.bodies.tube.spacing=0.625 mm", "performa
 PROGRAM = """
 import sys
 import numpy as np
-from distfsi import simulation
+from distfsi import run
 from distfsi.__main__ import main
 
 random = np.random.default_rng(7)  # the same on all ranks
 
-class AnyDeal(simulation.Balance):
+class AnyDeal(run.Balance):
     def watch(self, limit):
         super().watch(limit)
         return random.random(self._blocks.count) ** 8
 
-simulation.STEPS_BETWEEN_DEALS, simulation.Balance = 4, AnyDeal
+run.STEPS_BETWEEN_DEALS, run.Balance = 4, AnyDeal
 main(sys.argv[1:])
 """
 

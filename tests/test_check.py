@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.advice import advice
 from distfsi.scene.description import IdealGas, Jwl, StiffenedGas
 from distfsi.scene.signals import Layout, moving_share, steps, sub_steps
 from distfsi.scene.waves import Side, meet
-from distfsi.simulation import Simulation, deal_blocks, run
+from distfsi.simulation import Simulation, deal_blocks
 from distfsi.study import bench
 from distfsi.study.check import report
 from distfsi.study.exact import PureState, exact_riemann

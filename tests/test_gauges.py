@@ -15,8 +15,9 @@ from distfsi.output.history import read_history
 from distfsi.parts.peaks import schlieren
 from distfsi.parts.sampling import FluidSampler
 from distfsi.parts.solid import Solid
+from distfsi.run import run
 from distfsi.scene import load
-from distfsi.simulation import Simulation, run
+from distfsi.simulation import Simulation
 from launch import ROOT, run_ranks
 
 SOD, TUBE = ROOT / "inputs/sod.toml", ROOT / "inputs/steel_tube_full.toml"

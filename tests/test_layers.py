@@ -13,8 +13,8 @@ PACKAGE = ROOT / "distfsi"
 LAYERS = (
     {"__main__"},
     {"study"},
-    {"simulation"},
-    {"direct"},
+    {"run"},
+    {"simulation", "direct"},
     {"model", "parts"},
     {"kernels", "mesh", "device", "output", "scene"},
     {"physics"},

@@ -20,8 +20,8 @@ from distfsi.output.frames import Film
 from distfsi.output.info import describe
 from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
+from distfsi.run import run
 from distfsi.scene import load
-from distfsi.simulation import run
 from launch import ROOT
 
 SPACE = """

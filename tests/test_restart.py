@@ -21,8 +21,9 @@ from distfsi.output import requests
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.output.restart import Restart, newest_restart
+from distfsi.run import run
 from distfsi.scene import load
-from distfsi.simulation import Simulation, run
+from distfsi.simulation import Simulation
 from launch import ENVIRONMENT, ROOT, run_ranks
 
 SCRIPT = Path(__file__).with_name("mpi_restart.py")

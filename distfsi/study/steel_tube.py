@@ -19,8 +19,8 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
+from distfsi.run import run
 from distfsi.scene import load
-from distfsi.simulation import run
 from distfsi.study.references import STEEL_TUBE, STEEL_TUBE_JOHNSON_COOK, STEEL_TUBE_PLASTIC, TubeStrength
 
 DIRECTORY = Path("out/study_steel_tube")

@@ -17,8 +17,8 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
+from distfsi.run import run
 from distfsi.scene import load
-from distfsi.simulation import run
 from distfsi.study.references import TUBE_FRAGMENTS
 from distfsi.study.steel_tube import INPUT, WIDE
 

@@ -1,0 +1,156 @@
+"""A run: the loop over time, what it writes and what ends it."""
+
+from __future__ import annotations
+
+import time as clock
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from distfsi.device.cuda import NoGpu, gpu_of
+from distfsi.device.nvrtc import CompileError
+from distfsi.device.seam import Device
+from distfsi.direct import arrives, refusal
+from distfsi.errors import Diverged, InputError, Stopped
+from distfsi.mesh.balance import Balance, Handover
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.journal import Journal, set_aside
+from distfsi.output.picture import draw_summary
+from distfsi.output.progress import Progress
+from distfsi.output.records import Records
+from distfsi.output.requests import Request, Requests
+from distfsi.output.restart import find_restart
+from distfsi.output.storage import on_root, prepare_directory, storage
+from distfsi.parts.accounts import Accounts
+from distfsi.scene.description import Scene
+from distfsi.simulation import Simulation, threads_of_rank
+
+STEPS_BETWEEN_DEALS = 100
+
+
+def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
+    """Collective. The GPU on which this rank computes. Raises InputError on all ranks where one has none.
+
+    `direct`: messages are to lie in the GPU's memory.
+    """
+    gpu, faults = None, []
+    try:
+        gpu = gpu_of(communicator.local_rank, direct)
+    except (NoGpu, CompileError) as error:
+        faults.append(f"--gpu: {error}")
+    _refuse(faults, communicator)
+    if direct:
+        why = refusal(communicator)
+        _refuse([f"--gpu-aware-mpi: {why}"] if why else [], communicator)
+        if not arrives(communicator, gpu):
+            raise InputError(["--gpu-aware-mpi: messages between ranks arrive otherwise than they were sent"])
+    return gpu
+
+
+def _refuse(faults: list[str], communicator: Communicator) -> None:
+    """Collective. Raise InputError on all ranks when one has faults."""
+    faults = [fault for others in communicator.allgather(faults) for fault in others]
+    if faults:
+        raise InputError(sorted(set(faults)))
+
+
+def run(
+    scene: Scene,
+    communicator: Communicator,
+    threads: int | None = None,
+    restart: str | None = None,
+    on_gpu: bool = False,
+    direct: bool = False,
+) -> Simulation:
+    """Run the scene to its end, writing fields, history, restart files and a picture into its output directory.
+
+    `restart`: a restart file to go on from, or "auto": the newest in the output directory; without one from the start.
+    `on_gpu`: compute on the node's GPUs, rank by rank, in the place of threads; `direct`: with messages straight from
+    their memory.
+    Raises on all ranks: InputError for a restart file of another scene, OutputError, Diverged, and Stopped when a
+    signal, the stop file or the wall-clock limit has ended the run early.
+    """
+    started = clock.perf_counter()
+    directory, output = Path(scene.output.directory), scene.output
+    requests = Requests(output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
+    files = storage(output.hdf5, communicator)
+    origin = find_restart(restart, directory, scene, communicator)
+    prepare_directory(directory, communicator)
+    if restart is None:
+        set_aside(directory, communicator)
+    progress = Progress(scene.time.end, communicator)
+    threads = threads or threads_of_rank(communicator)
+    journal = Journal(directory, scene, communicator, threads)
+    costs, device = None, gpu_of_rank(communicator, direct) if on_gpu else None
+    with requests, closing(progress), threadpool_limits(1), journal:
+        while True:
+            simulation = Simulation.of(scene, communicator, threads, costs, device)
+            simulation.asked = requests.strongest
+            accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
+            records = Records(simulation, accounts, files, origin)
+            kept = simulation.kept() | {"accounts": accounts, "records": records}
+            if origin:
+                origin.restore(kept, simulation.blocks, communicator)
+            else:
+                simulation.watch()
+                records.write()
+            costs = advance(simulation, records, kept, requests, progress)
+            if costs is None:
+                break
+            snapshots = {name: part.snapshot() for name, part in kept.items()}
+            origin = Handover(simulation.time, simulation.steps, records.restart, snapshots)
+            del simulation, accounts, records, kept, snapshots  # before those of the new owners are built
+    done = (
+        f"done: t = {simulation.time:.6g} s after {simulation.steps} steps in {clock.perf_counter() - started:.1f} s."
+    )
+    fluid = simulation.fluid
+    rest = f" {100 * fluid.share_at_rest():.0f} % of the tile stages were at rest." if fluid else ""
+    progress.finish(f"{done} {accounts.summary(simulation)}{rest}")
+    picture = on_root(communicator, directory / "summary.png", lambda: draw_summary(directory))
+    if communicator.rank == 0:
+        print(f"results in {directory}, picture in {picture}", flush=True)
+    return simulation
+
+
+def advance(
+    simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress
+) -> np.ndarray | None:
+    """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped.
+
+    None at the end of the run; before it the costs (count,) of the blocks, if they should change hands.
+    """
+    balance = Balance(simulation.parts, simulation.blocks)
+    while not simulation.done:
+        alone = simulation.alone
+        try:
+            simulation.step()
+            saving = simulation.request is not Request.NOTHING and not simulation.done
+            if saving:
+                simulation.check()
+        except Diverged as error:
+            records.write_fields()
+            if simulation.is_valid():
+                records.write_restart({name: part.snapshot() for name, part in kept.items()})
+            raise Diverged(f"{error}\n{records.left_behind()}") from error
+        if simulation.alone > alone:
+            when = f"t = {simulation.time:.6g} s, after {simulation.steps} steps"
+            why = f"its pressure on the solid is below {simulation.scene.coupling.drop_below:g} Pa everywhere"
+            progress.say(f"the fluid is dropped at {when}: {why} (coupling.drop_below); the solid goes on alone")
+        records.write(always=simulation.done)
+        progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)
+        if saving:
+            path = records.write_restart({name: part.snapshot() for name, part in kept.items()})
+            requests.saved()
+            if simulation.request.stops:
+                requests.remove_stop_file()
+                when = f"at t = {simulation.time:.6g} s after {simulation.steps} steps"
+                remedy = "the same command with --restart auto goes on"
+                raise Stopped(f"stopped {when} by {requests.words(simulation.request)}, state in {path}; {remedy}")
+        if simulation.steps % STEPS_BETWEEN_DEALS == 0 and simulation.communicator.size > 1:
+            costs = balance.watch(simulation.scene.performance.imbalance)
+            records.write_balance(balance.imbalance, changes_hands=costs is not None)
+            if costs is not None:
+                return costs
+    return None
