@@ -120,6 +120,7 @@ def test_stability(tmp_path, monkeypatch):
         assert (tmp_path / f"{shown.name}.png").exists()
 
 
+@pytest.mark.full
 def test_exact_cases(capsys):
     """The quick size: a line for each case, the shock in Sod's tube within a cell, none broken up but HLLC's."""
     exact_cases.quick(Communicator(), [])

@@ -225,7 +225,7 @@ def test_a_falling_pressure_is_held_before_it_vanishes(pair):
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @pytest.mark.parametrize("b", [1.0, 0.25, 2.0 / 3.0])
 def test_compiled_stage_leaves_a_uniform_state_to_the_bit(pair, b):
-    a1, pressures, densities = draw(pair, 0.0)
+    a1, pressures, densities = draw(pair, 0.0, SAMPLES)
     a1[:3], a1[3:6] = TRACE, 1.0 - TRACE
     conserved = model_of(*pair).formula("conserved")
     U = np.array([conserved((*rho, 100.0, p[0], a)) for a, p, rho in zip(a1, pressures, densities, strict=True)])

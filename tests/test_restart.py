@@ -20,7 +20,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output import requests
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.output.restart import Restart, newest_restart
+from distfsi.output.restart import FORMAT, Restart, newest_restart
 from distfsi.run import run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
@@ -351,7 +351,7 @@ def test_an_incomplete_restart_file_is_passed_over(tmp_path):
     """auto takes the one before; without any that is complete it refuses rather than start anew and remove them."""
     for step in (5, 7):
         with h5py.File(tmp_path / f"restart-{step:08d}.h5", "w") as file:
-            file.attrs.update(format=1, step=step)
+            file.attrs.update(format=FORMAT, step=step)
             file["scene"], file["simulation/values/time"] = "{}", 0.5
     newest = tmp_path / "restart-00000007.h5"
     assert newest_restart(tmp_path) == newest

@@ -61,15 +61,16 @@ def test_dilation_conserves_mass_and_particles_per_support(dimensions):
 
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
 def test_pair_forces_are_opposite_to_the_bit_and_energy_balances(dimensions):
-    kernels = compiled(dimensions, pair.approach_speed, pair.viscosity, pair.pair_acceleration, pair.pair_heating)
+    kernels = compiled(dimensions, pair.approach_speeds, pair.viscosity, pair.pair_acceleration, pair.pair_heating)
     random = np.random.default_rng(1)
     dx, v_i, v_j = random.normal(size=(3, dimensions)) * 0.3
     S_i, S_j = random.normal(size=(2, dimensions, dimensions))
     dv, distance2, slope = v_i - v_j, float(dx @ dx), -0.8
-    approach = kernels.approach_speed(tuple(dv), tuple(dx), distance2, 1.0)
-    assert approach == kernels.approach_speed(tuple(-dv), tuple(-dx), distance2, 1.0)
-    Pi = kernels.viscosity(0.3, 2.0, 1.1)
-    assert Pi == pytest.approx(0.3 * (2.0 + 2.0 * 0.3) / 1.1)
+    seen = -0.1, -0.3
+    approach = kernels.approach_speeds(tuple(dv), tuple(dx), seen, distance2, 1.0)
+    assert approach == kernels.approach_speeds(tuple(-dv), tuple(-dx), seen[::-1], distance2, 1.0)
+    Pi = kernels.viscosity(0.3, 0.2, 2.0, 1.1)
+    assert Pi == pytest.approx((2.0 * 0.2 + 2.0 * 0.3**2) / 1.1)
     a_i = np.array(kernels.pair_acceleration(tuple(dx), slope, as_rows(S_i + S_j), 1.3, Pi))
     a_j = np.array(kernels.pair_acceleration(tuple(-dx), slope, as_rows(S_j + S_i), 1.3, Pi))
     assert np.array_equal(a_i, -a_j)
@@ -79,10 +80,12 @@ def test_pair_forces_are_opposite_to_the_bit_and_energy_balances(dimensions):
 
 
 def test_viscosity_and_pressure_push_apart_and_heat():
-    kernels = compiled(2, pair.approach_speed, pair.pair_acceleration, pair.pair_heating)
+    kernels = compiled(2, pair.approach_speeds, pair.pair_acceleration, pair.pair_heating)
     dx, nearing, nothing, pressure = (0.5, 0.0), (-1.0, 0.0), np.zeros((2, 2)), -np.eye(2)
-    assert kernels.approach_speed(nearing, dx, 0.25, 1.0) == pytest.approx(0.5 / 0.26)
-    assert kernels.approach_speed((1.0, 0.0), dx, 0.25, 1.0) == 0.0
+    unseen, smooth = (0.0, 0.0), (-0.5, -0.5)
+    assert kernels.approach_speeds(nearing, dx, unseen, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.5 / 0.26))
+    assert kernels.approach_speeds(nearing, dx, smooth, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.0))
+    assert kernels.approach_speeds((1.0, 0.0), dx, unseen, 0.25, 1.0) == (0.0, 0.0)
     for stress, Pi in ((pressure, 0.0), (nothing, 1.0)):
         assert kernels.pair_acceleration(dx, -1.0, as_rows(stress), 1.0, Pi)[0] > 0.0
         assert kernels.pair_heating(nearing, dx, -1.0, as_rows(stress), 1.0, Pi) > 0.0
