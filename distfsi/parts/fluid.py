@@ -228,8 +228,9 @@ class Fluid:
         if not self.blocks.local_count:
             return 0.0, (), ""
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
+        before = self.team.get(self.previous[block : block + 1])[(0, *self._inside(block))]
         with np.errstate(all="ignore"):
-            W = self.model.formula("primitives")(self.active(self.previous, block).astype(np.float64))
+            W = self.model.formula("primitives")(before.astype(np.float64))
             c = self.model.formula("sound_speed")(W)
         axes = range(self.model.dimensions)
         speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
@@ -380,8 +381,12 @@ class Fluid:
 
     def active(self, field: np.ndarray, block: int) -> np.ndarray:
         """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""
+        return field[(block, *self._inside(block))]
+
+    def _inside(self, block: int) -> tuple:
+        """Where the active cells of a local block are in what is stored of it."""
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
-        return field[(block, ..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))]
+        return (..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))
 
     def _cell_volume(self) -> float:
         return float(np.prod(self.blocks.grid.spacing[: self.model.dimensions]))
