@@ -24,6 +24,7 @@ def test_a_ring_of_scattered_strength_breaks_into_pieces_as_mott_says():
 
 @pytest.mark.full
 def test_a_tube_of_brittle_steel_bursts():
-    burst = tube_alone.burst(tube_alone.scaled(0.1), 1, 20e-6)
-    assert 1.1 < burst.first_failure < burst.first_break < 1.5
+    burst = tube_alone.burst(tube_alone.scaled(0.1), 1, 30e-6)
+    assert 1.1 < burst.first_failure < 1.3
+    assert burst.first_failure < burst.first_break < 1.8
     assert burst.pieces > 20
