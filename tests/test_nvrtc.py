@@ -46,8 +46,8 @@ def test_solid_and_coupling_compile():
 
 @pytest.mark.full
 def test_every_kernel_of_every_shipped_input_compiles():
-    """Each text of all inputs and of standard fluids in one, two and three dimensions, in float64 and float32, for sm_90;
-    no stage spills. `study kernels` does all for all architectures."""
+    """Each text of all inputs and of standard fluids in one, two and three dimensions, in float64 and float32, for
+    sm_90; no stage spills. `study kernels` does all for all architectures."""
     scenes = kernels.shipped(ROOT / "inputs") | kernels.standard()
     texts = kernels.texts(scenes, Communicator())
     assert {name for of in texts.values() for name in of.scenes} == set(scenes) and len(texts) > 300
