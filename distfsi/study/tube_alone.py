@@ -151,11 +151,20 @@ def _study(communicator, overrides, cases, seeds) -> None:
 
 
 def told(name: str, found: Sequence[Burst]) -> str:
-    """Means over the seeds that broke."""
-    names = (*Burst.__annotations__, "thickness", "width")
-    mean = {name: np.nanmean([getattr(b, name) for b in found]) for name in names}
-    return (
-        f"  fracture strain {name:10}  first failure at r/r0 {mean['first_failure']:.2f}, first break at"
-        f" {mean['first_break']:.2f} ({1e6 * mean['break_time']:.1f} us), wall {1e3 * mean['thickness']:.2f} mm,"
-        f" {mean['pieces']:.0f} pieces {1e3 * mean['width']:.2f} mm wide, {mean['velocity']:.0f} m/s"
+    """Means over the seeds; those of a break over the seeds that broke."""
+    mean = _mean(found, "first_failure", "velocity")
+    start = (
+        f"  fracture strain {name:10}  first failure at r/r0 {mean['first_failure']:.2f}, {mean['velocity']:.0f} m/s,"
     )
+    broken = [b for b in found if b.pieces > 1]
+    if not broken:
+        return f"{start} no break until the end"
+    mean = _mean(broken, "first_break", "break_time", "thickness", "pieces", "width")
+    return (
+        f"{start} first break at {mean['first_break']:.2f} ({1e6 * mean['break_time']:.1f} us), wall"
+        f" {1e3 * mean['thickness']:.2f} mm, {mean['pieces']:.0f} pieces {1e3 * mean['width']:.2f} mm wide"
+    )
+
+
+def _mean(bursts: Sequence[Burst], *names: str) -> dict[str, float]:
+    return {name: float(np.mean([getattr(burst, name) for burst in bursts])) for name in names}
