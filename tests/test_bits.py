@@ -45,7 +45,13 @@ def run_tube(directory, ranks, threads, blocks):
 
 @pytest.mark.parametrize(
     ("ranks", "threads", "blocks"),
-    [(1, 2, "small"), (1, 1, "large"), (2, 1, "small"), (4, 1, "small"), (2, 2, "large")],
+    [
+        (1, 2, "small"),
+        (1, 1, "large"),
+        (2, 1, "small"),
+        pytest.param(4, 1, "small", marks=pytest.mark.full),
+        pytest.param(2, 2, "large", marks=pytest.mark.full),
+    ],
 )
 def test_coupled_run_has_the_same_bits(reference, tmp_path, ranks, threads, blocks):
     """A tube wall that moves across rank borders: cells and particles agree to the last bit."""

@@ -47,7 +47,7 @@ def sedov(dimensions, cells):
     ("dimensions", "cells", "radius", "density"),
     [
         (1, 200, 0.005, 5.0),
-        (2, 80, 0.0075, 4.0),
+        pytest.param(2, 80, 0.0075, 4.0, marks=full),
         pytest.param(2, 120, 0.005, 4.5, marks=full),
         pytest.param(3, 64, 0.01, 4.0, marks=full),
     ],

@@ -81,7 +81,7 @@ def steps_side_by_side(monkeypatch, path, steps, overrides=()):
 @pytest.mark.parametrize(
     ("dimensions", "phases", "precision", "scheme", "form"),
     [
-        (1, {"air": AIR}, "float32", "paper", "updated_lagrangian"),
+        pytest.param(1, {"air": AIR}, "float32", "paper", "updated_lagrangian", marks=pytest.mark.full),
         (2, {"air": AIR}, "float32", "cut_cells", "total_lagrangian"),
         pytest.param(2, {"tnt": TNT, "air": AIR}, "float64", "paper", "updated_lagrangian", marks=pytest.mark.full),
         pytest.param(2, {"tnt": TNT, "air": AIR}, "float32", "stairs", "total_lagrangian", marks=pytest.mark.full),
