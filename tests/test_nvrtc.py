@@ -45,6 +45,7 @@ def test_solid_and_coupling_compile():
 
 
 @pytest.mark.full
+@pytest.mark.timeout(1200)
 def test_every_kernel_of_every_shipped_input_compiles():
     """Each text of all inputs and of standard fluids in one, two and three dimensions, in float64 and float32, for
     sm_90; no stage spills. `study kernels` does all for all architectures."""
