@@ -96,22 +96,9 @@ def touch(
 
 @driver
 def heat_contact(
-    begin,
-    end,
-    rows,
-    neighbours,
-    neighbour_count,
-    position,
-    state,
-    reference,
-    size,
-    parted,
-    body,
-    mass,
-    dt,
-    motion,
+    begin, end, rows, neighbours, neighbour_count, position, state, reference, size, parted, body, mass, dt, motion,
     energy,
-):
+):  # fmt: skip
     """Advance the energy by half the work of the contact forces; `motion` (count, D …): means of velocities."""
     for r in range(begin, end):
         i = rows[r]

@@ -94,16 +94,12 @@ def bond_stress(deviator, pressure, deformation, correction, stiffness):
 
 
 def least_stretch(deformation):
-    """Lower bound of the principal stretches, tight when the others are equal (Wolkowicz & Styan 1980)."""
-    back = inverse(deformation)
-    squared = product(back, transposed(back))
-    mean = trace(squared) * (1.0 / DIMENSIONS)
-    spread = max(trace(product(squared, squared)) * (1.0 / DIMENSIONS) - mean * mean, 0.0)
-    return 1.0 / sqrt(mean + sqrt(spread * (DIMENSIONS - 1.0)))
+    """Lower bound of the principal stretches, exact in one and two dimensions."""
+    return 1.0 / largest_stretch(transposed(inverse(deformation)))
 
 
 def largest_stretch(deformation):
-    """Upper bound of the principal stretches, exact in one and two dimensions (as least_stretch)."""
+    """Upper bound of the principal stretches, tight when the others are equal (Wolkowicz & Styan 1980)."""
     squared = product(transposed(deformation), deformation)
     mean = trace(squared) * (1.0 / DIMENSIONS)
     spread = max(trace(product(squared, squared)) * (1.0 / DIMENSIONS) - mean * mean, 0.0)

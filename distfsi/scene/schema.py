@@ -278,8 +278,8 @@ class CouplingInput(Table):
     )
     drop_below: quantity("Pa", gt=0.0) | None = Field(
         None,
-        description="when the pressure on the solid, once it has been higher, is below this everywhere, the fluid is "
-        "dropped and the solid goes on alone; default: never",
+        description="when the fluid's (absolute) pressure on the solid, once it has been higher, is below this "
+        "everywhere, the fluid is dropped and the solid goes on alone; default: never",
     )
 
 
