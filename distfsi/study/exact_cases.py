@@ -78,7 +78,7 @@ class Blast:
     quick_cells: int
 
 
-BLASTS = {1: Blast(2 * 0.0673185, 0.5, 200, 50), 2: Blast(0.311357, 0.75, 120, 30), 3: Blast(0.851072, 1.0, 64, 12)}
+BLASTS = {1: Blast(2 * 0.0673185, 0.5, 200, 50), 2: Blast(0.311357, 0.75, 120, 30), 3: Blast(0.851072, 1.0, 90, 12)}
 DEPOSIT = 2.5  # radius of the heated ball, in cells
 
 
@@ -91,8 +91,11 @@ def blast_line(dimensions: int, cells: int) -> str:
     box = f"lower={[0.0] * D}, upper={[size] * D}, cells={[cells] * D}"
     settings = [f"domain={{{box}, {ends}}}"]
     settings += [f"fluid.regions.1.shape.center={[0.0] * D}", f"fluid.regions.1.shape.radius={hot}"]
-    held = start(load(INPUTS / "sedov.toml", [*settings, "fluid.regions.1.pressure=1"])).fluid.totals()[0][-1]
-    pressure = blast.energy / 2**D / held  # the cells that the ball covers in part do not add up to it exactly
+    one, two = (
+        start(load(INPUTS / "sedov.toml", [*settings, f"fluid.regions.1.pressure={p}"])).fluid.totals()[0][-1]
+        for p in (1.0, 2.0)
+    )
+    pressure = blast.energy / 2**D / (two - one)  # the cells that the ball covers in part do not add up to it exactly
     simulation = finished("sedov.toml", [*settings, f"fluid.regions.1.pressure={pressure}"])
     r, p = radial_mean(simulation, "pressure")
     behind = 2.0 / 2.4 * (2.0 / (D + 2.0) * blast.radius) ** 2
