@@ -13,8 +13,9 @@ from distfsi.scene.shapes import cell_fractions, contains
 class InitialState:
     """Conserved states of the scene's regions, for one or two phases.
 
-    A region is one pure phase. With two phases the other one is present as a trace of volume fraction
-    `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives for it.
+    A region is one phase. With two phases the other one is present in it, too, as much as the region's state says or as
+    a trace of `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives
+    for it.
     """
 
     def __init__(self, fluid: Fluid, model):
@@ -53,8 +54,9 @@ class InitialState:
         return states
 
     def _fraction(self, state: FluidState) -> float:
-        trace = self.fluid.minimum_volume_fraction
-        return 1.0 - trace if state.phase == 0 else trace
+        given = state.volume_fraction
+        other = self.fluid.minimum_volume_fraction if given is None else 1.0 - given
+        return 1.0 - other if state.phase == 0 else other
 
     def _densities(self, state: FluidState) -> list[float]:
         other = 1 - state.phase

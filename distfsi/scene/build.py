@@ -84,7 +84,7 @@ def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> Flu
     p = given.pressure
     if p is None:
         p = pressure(phases[index].eos, given.density, given.energy)
-    return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions)
+    return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
 
 
 def build_solid(given: SolidInput, dimensions: int) -> Solid:

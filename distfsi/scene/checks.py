@@ -115,7 +115,13 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
 
 
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
-    """A state needs a real sound speed."""
+    """A mixture needs two phases within their bounds, a state a real sound speed."""
+    if state.volume_fraction is not None:
+        least = fluid.minimum_volume_fraction
+        if len(fluid.phases) < 2:
+            yield Fault((*path, "volume_fraction"), "needs two phases")
+        elif not least <= state.volume_fraction <= 1.0 - least:
+            yield Fault((*path, "volume_fraction"), f"expected {least:g} to 1 - {least:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
     cold_pressure, cold_energy, _ = cold_curve(phase.eos, state.density)
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:

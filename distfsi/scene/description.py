@@ -112,12 +112,16 @@ class Phase:
 
 @dataclass(frozen=True)
 class FluidState:
-    """State of one pure phase: density [kg/m3], pressure [Pa], velocity [m/s]; `phase` indexes Fluid.phases."""
+    """State of a phase: density [kg/m3], pressure [Pa], velocity [m/s]; `phase` indexes Fluid.phases.
+
+    volume_fraction: of the phase in a mixture with the other one; None: pure, but for the least trace of the other
+    """
 
     phase: int
     density: float
     pressure: float
     velocity: tuple[float, ...]
+    volume_fraction: float | None = None
 
 
 @dataclass(frozen=True)

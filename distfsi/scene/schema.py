@@ -61,13 +61,17 @@ class TimeInput(Table):
 
 
 class StateInput(Table):
-    """State of one pure phase; give its pressure or its energy."""
+    """State of a phase, and how much of the other there is in it; give its pressure or its energy."""
 
     phase: PhaseName = Field(description="name of the phase")
-    density: Density = Field(description="density")
+    density: Density = Field(description="density of the phase")
     pressure: Pressure | None = Field(None, description="pressure")
     energy: quantity("J/kg") | None = Field(None, description="specific internal energy, instead of the pressure")
     velocity: Velocity | None = Field(None, description="velocity; default at rest")
+    volume_fraction: quantity("1", gt=0.0, lt=1.0) | None = Field(
+        None,
+        description="of the phase in a mixture with the other; default all but `minimum_volume_fraction`",
+    )
 
     @model_validator(mode="after")
     def _one_of_two(self) -> StateInput:
@@ -112,7 +116,7 @@ class FluidInput(Table):
         "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
     )
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
-        1e-6, description="share of the absent phase in a pure region"
+        1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
     )
     precision: Literal["float64", "float32"] = Field("float64", description="arithmetic")
 
