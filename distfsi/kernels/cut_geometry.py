@@ -11,17 +11,15 @@ are seen in the mirror of its sides.
 
 from math import sqrt
 
-from distfsi.device.markers import driver, helper, load, workspace
+from distfsi.device.markers import driver, helper, load
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
-from distfsi.kernels.gather import any_particle, bins_around, sum_particles
+from distfsi.kernels.gather import any_particle, bins_around
 from distfsi.physics.apertures import open_cell, open_face
-from distfsi.physics.immersed import immersed_weight
+from distfsi.physics.immersed import broad_weight, immersed_weight
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
 
-FILLED = 0.99  # of the kernel: a body is thick where a particle is as deep as this
-FADING = 0.05  # of the kernel: over which the balls vanish as a body becomes thick
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
 
 SHUT = DEEP  # a cell whose faces are closed, with fluid in it
@@ -34,22 +32,30 @@ NEAR, CUT = 1, 2
 
 @driver
 def fill_kernel(begin, end, filled, radius, volume, position, start, order, lower, size, low, window, strides):
-    """filled[p] = share of the kernel around a particle that is filled with particles' `volume` (n, 1)."""
-    sums = workspace(1)
+    """filled[p] = share of the broad kernel around a particle that is filled with particles' `volume` (n, 1)."""
     for p in range(begin, end):
-        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
-        filled[p] = sums[0]
+        x, total = tuple(position[p, d] for d in static_range(DIMENSIONS)), 0.0
+        bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
+        for k in range(bz[0], bz[1]):
+            for j in range(by[0], by[1]):
+                row = k * strides[2] + j * strides[1]
+                for n in range(start[row + bx[0]], start[row + bx[1]]):
+                    q = order[n]
+                    dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
+                    total += volume[q, 0] * broad_weight(dot(dx, dx), radius)
+        filled[p] = total
 
 
 @driver
 def thicken(
-    begin, end, ball, filled, radius, ball_radius, volume, position, start, order, lower, size, low, window, strides
+    begin, end, ball, filled, radius, ball_radius, thin, thick, volume, position, start, order, lower, size, low,
+    window, strides,
 ):  # fmt: skip
-    """ball[p] = radius [m] of a particle's ball: `ball_radius` in a body so thin that no kernel nearby is filled."""
+    """ball[p] = radius [m] of a particle's ball: `ball_radius` in a body so thin that no kernel nearby is filled by
+    more than the share `thin`, 0 where one is by `thick`."""
     for p in range(begin, end):
         ball[p], most = 0.0, filled[p]
-        if most >= FILLED or volume[p, 0] <= 0.0:
+        if most >= thick or volume[p, 0] <= 0.0:
             continue
         x = tuple(position[p, d] for d in static_range(DIMENSIONS))
         bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
@@ -61,7 +67,7 @@ def thicken(
                     dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
                     if dot(dx, dx) < radius * radius:
                         most = max(most, filled[q])
-        ball[p] = ball_radius * min(max((FILLED - most) / FADING, 0.0), 1.0)
+        ball[p] = ball_radius * min(max((thick - most) / (thick - thin), 0.0), 1.0)
 
 
 @helper

@@ -20,6 +20,9 @@ from distfsi.parts.search import SearchCells
 
 SMOOTHING_RADIUS = 1.5  # in cells, of the kernel whose sum gives the distance
 COARSEST = 3.0  # particle spacings that this radius spans at least
+MARGIN = 0.15  # of a cell, on each side: what thin bodies are thicker than must be, as they move in a step
+THIN, THICK = 0.1, 0.45  # of a cell, beyond its diagonal: the thickness up to which a body is thin, and from which not
+NEARBY = 1.2  # kernel radii from where a body is thick to the particles of its corners
 PROFILE_POINTS = 1025
 DRIVERS = (
     *search.DRIVERS,
@@ -57,6 +60,13 @@ def plane_profile(dimensions: int, points: int = PROFILE_POINTS) -> np.ndarray:
     return 0.5 + 0.5 * (share - share[::-1])[::8] / share[-1]
 
 
+def plate_share(dimensions: int, thickness: float) -> float:
+    """Share of the broad kernel (physics/immersed.py) of radius 1 that a plate of a `thickness` around it fills."""
+    s = np.linspace(-1.0, 1.0, 4001)
+    density = (1.0 - s**2) ** (2.0 + 0.5 * (dimensions - 1))
+    return float(density[np.abs(s) < 0.5 * thickness].sum() / density.sum())
+
+
 class WallGeometry:
     """Open parts of cells and faces, before and after a step; arrays are the device's.
 
@@ -74,7 +84,8 @@ class WallGeometry:
         self.kernels: SimpleNamespace = team.build((*DRIVERS, *(STAIRS if stairs else ())), {"DIMENSIONS": D})
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
-        self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + 0.05 * h
+        self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h
+        self._thickness = tuple(plate_share(D, (sqrt(D) + more) * h / self.radius) for more in (THIN, THICK))
         self.search = max(self.radius, self.ball + 1.05 * h)
         self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.5 * h), 2.5 * h)
         self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
@@ -108,7 +119,7 @@ class WallGeometry:
         return self._cells.sort(position, key, self._least_spacing)[1]
 
     def fill(self, own: int, position: Any, volume: Any, bins: SearchCells) -> Any:
-        """Share (own,) of the kernel around each of the first `own` particles that is filled."""
+        """Share (own,) of the broad kernel around each of the first `own` particles that is filled."""
         filled = self.team.empty(own)
         self.team.run(self.kernels.fill_kernel, own, filled, self.radius, volume, position, *bins)
         return filled
@@ -117,7 +128,8 @@ class WallGeometry:
         """Radius (own,) [m] of the balls as which particles of thin bodies count; `filled` of all particles."""
         ball = self.team.empty(own)
         self.team.run(
-            self.kernels.thicken, own, ball, filled, self.radius, self.ball, volume, position, *bins
+            self.kernels.thicken, own, ball, filled, NEARBY * self.radius, self.ball, *self._thickness, volume,
+            position, *bins,
         )  # fmt: skip
         return ball
 

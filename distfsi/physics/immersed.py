@@ -1,5 +1,7 @@
 """The immersed boundary: weights between cells and particles, what a cell behind the wall holds (paper, Sec. 3.2)."""
 
+from math import pi
+
 from distfsi.physics.smoothing import smoothing_kernel
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
@@ -8,6 +10,17 @@ from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
 def immersed_weight(distance2, radius):
     """Wendland C2 kernel [1/m^d] that vanishes at `radius`, at the squared distance `distance2` [m2] below radius^2."""
     return smoothing_kernel(distance2, 0.5 * radius)
+
+
+def broad_weight(distance2, radius):
+    """Kernel (1 - q^2)^2 [1/m^d] of `radius`, q = r/radius, at the squared distance `distance2` [m2]; 0 beyond it."""
+    s = max(1.0 - distance2 / (radius * radius), 0.0)
+    if DIMENSIONS == 1:
+        return 0.9375 / radius * s * s
+    if DIMENSIONS == 2:
+        return 3.0 / pi / (radius * radius) * s * s
+    if DIMENSIONS == 3:
+        return 3.28125 / pi / (radius * radius * radius) * s * s
 
 
 def moving_with(W, velocity):
