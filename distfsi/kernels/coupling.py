@@ -329,6 +329,12 @@ def cells_within(x, radius, lower, spacing, first, end):
 
 
 @helper
+def three(position, p):
+    """Coordinates of a particle; an unused axis has one cell, from 0 to 1."""
+    return (position[p, 0], position[p, 1] if DIMENSIONS > 1 else 0.5, position[p, 2] if DIMENSIONS > 2 else 0.5)
+
+
+@helper
 def home_of(x, lower, spacing, grid_cells, block_cells, curve_index):
     """Curve index of the block that x is in or, outside, nearest to."""
     own = tuple(
@@ -362,20 +368,16 @@ def sum_cells(x, b, radius, kick, shape, lower, spacing, origin, extent, seen_ce
 
 @driver
 def push(
-    begin, end, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, seen_cells,
+    begin, end, start, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, seen_cells,
     grid_cells, block_cells, curve_index, first_block,
 ):  # fmt: skip
-    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around a particle; home[p] = its local block.
+    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle; home[p] =
+    the local block that it was in at the `start` of the step.
 
     seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes.
     """
     for p in range(begin, end):
-        x = (  # an unused axis has one cell, from 0 to 1
-            position[p, 0],
-            position[p, 1] if DIMENSIONS > 1 else 0.5,
-            position[p, 2] if DIMENSIONS > 2 else 0.5,
-        )
-        home[p] = home_of(x, lower, spacing, grid_cells, block_cells, curve_index) - first_block
-        total = sum_cells(x, home[p], radius, kick, shape, lower, spacing, origin, extent, seen_cells)
+        home[p] = home_of(three(start, p), lower, spacing, grid_cells, block_cells, curve_index) - first_block
+        total = sum_cells(three(position, p), home[p], radius, kick, shape, lower, spacing, origin, extent, seen_cells)
         for d in static_range(DIMENSIONS):
             impulse[p, d] = mass[p] * total[d]

@@ -63,6 +63,14 @@ def mark_stretched(begin, end, cell, farthest, volume, bond_count, deformation, 
 
 
 @driver
+def find_middle(begin, end, start, position, middle):
+    """middle[i] of the way of a particle in a step."""
+    for i in range(begin, end):
+        for d in static_range(DIMENSIONS):
+            middle[i, d] = 0.5 * (start[i, d] + position[i, d])
+
+
+@driver
 def find_momentum(begin, end, mass, velocity, momentum):
     """momentum[i] = mass and mass times velocity."""
     for i in range(begin, end):

@@ -36,6 +36,7 @@ PARTICLE_DRIVERS = (
     cut_forces.keep_inside,
     cut_forces.find_volumes,
     cut_forces.mark_stretched,
+    cut_forces.find_middle,
     cut_forces.find_momentum,
     cut_forces.see_particles,
     cut_forces.find_pressures,
@@ -229,9 +230,9 @@ class CutCells:
         self._exchange(self._kick, np.arange(D), 0.0)
         given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
         self.team.run(
-            self.kernels.push, own, self.solid.start, self._own_mass, given, home, wall.seen, self._kick, wall.shape,
-            self._corners[0], wall.spacing, wall.origin, wall.extent, self._seen_cells, wall.cells, *self._homes,
-            self.blocks.first,
+            self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, given, home, wall.seen,
+            self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin, wall.extent, self._seen_cells,
+            wall.cells, *self._homes, self.blocks.first,
         )  # fmt: skip
         self._run(self.kernels.clear, D, self._kick.reshape(-1), wall.shape)
         return given
@@ -279,14 +280,15 @@ class CutCells:
     def _cut(self, start: Any, velocity: Any) -> None:
         """The cells cut by this rank's particles and those around, which have moved from `start` with `velocity`."""
         c, team, wall, own = self.solid.columns, self.team, self.wall, self.solid.count
-        self._own_mass = team.empty(own)
+        self._own_mass, self._own_middle = team.empty(own), team.empty(start.shape)
+        team.run(self.kernels.find_middle, own, start, *c.read("position"), self._own_middle)
         team.run(self.kernels.keep_mass, own, start, *c.read("mass", "density"), *self._corners, self._own_mass)
         self._plan = self._ghosts(start, c["id"])
         vector = tuple((a,) for a in range(self._dimensions))
-        self._particle_start, self._particle_velocity, self._mass = self._plan.exchange(
-            [(start, "position"), (velocity, vector), (self._own_mass, ((),))]
+        self._middle, self._particle_velocity, self._mass = self._plan.exchange(
+            [(self._own_middle, "position"), (velocity, vector), (self._own_mass, ((),))]
         )
-        self._start_bins = wall.sort(self._particle_start, self._plan.key.there)
+        self._middle_bins = wall.sort(self._middle, self._plan.key.there)
         point, volume, number = self._points.of(c)
         team.run(self.kernels.keep_inside, point.shape[0], point, *self._corners, volume)
         plan = self._plan if number is c["id"] else self._ghosts(point, number)
@@ -342,13 +344,14 @@ class CutCells:
         self._groups = Groups(self.team, self.kernels, self._band_cells)
 
     def _see(self, velocity: Any, mean: Any) -> None:
-        """mean (band, D) of particles' velocities around the cells, where the particles were when the step began."""
+        """mean (band, D) of particles' velocities around the cells, where the particles were in the middle of the step:
+        only there is the way that a turning wall went along itself."""
         count, wall = velocity.shape[0], self.wall
         momentum = self.team.empty((count, 1 + self._dimensions))
         self.team.run(self.kernels.find_momentum, count, self._mass, velocity, momentum)
         self._run(
-            self.kernels.see_particles, self._area, mean, self._inertia, wall.seen, momentum, self._particle_start,
-            *self._start_bins, wall.shape, wall.spacing, wall.origin,
+            self.kernels.see_particles, self._area, mean, self._inertia, wall.seen, momentum, self._middle,
+            *self._middle_bins, wall.shape, wall.spacing, wall.origin,
         )  # fmt: skip
 
     def _mix(self, U: Any, fraction: Any) -> None:
