@@ -32,6 +32,7 @@ STUDIES = (  # modules of distfsi.study, with underscores in the place of blanks
     "stability coupling",
     "fragments",
     "tube_alone",
+    "liftoff",
 )
 
 
