@@ -533,6 +533,30 @@ def test_a_shock_pushes_a_wall_with_its_reflected_pressure(phases, mach):
     assert impulse[0] / dt == pytest.approx(reflected - 1.0, rel=1e-2)
 
 
+@pytest.mark.parametrize(
+    ("lightness", "cells", "cfl"),
+    [(1.0, 2.0, 0.9), (1.0, 1.0, 0.5), pytest.param(0.1, 1.0, 0.05, marks=pytest.mark.full)],
+)
+def test_a_light_plate_goes_along_with_the_water_around_it(lightness, cells, cfl):
+    """A wave moves it as the water, u = p/(rho c), as long as rho c dt is at most half of its mass per area m: the most
+    that exchange at the old velocity bears. Before that, u (1 - exp(-2 rho c t/m))."""
+    n, rho, base, over = 80, 1000.0, 1e3, 1e5
+    h, c = 1.0 / n, sqrt(4.4 * (base + 6e8) / rho)
+    low, mass = 0.5 + 0.3 * h, lightness * rho * cells * h
+    plate = body(Box((low,), (low + cells * h,)), 0.5 * h, lightness * rho, (0,), stiffness=2.64e9)
+    wave = gas(rho * (1.0 + over / (4.4 * (base + 6e8))), base + over, (over / (rho * c),))
+    regions = [(gas(rho, base, (0,)), None), (wave, Box((0.0,), (0.4,)))]
+    water = (d.Phase("water", d.StiffenedGas(4.4, 6e8)),)
+    case = coupled([plate], regions, (0.0,), (1.0,), (n,), (OPEN,), block=n, phases=water, cfl=cfl, runge_kutta="rk2")
+    velocity = []
+    while case.simulation.time < 0.4 / c:
+        case.step()
+        velocity.append(case.solid.totals()["momentum"][0] / mass * rho * c / over)
+    assert rho * c * case.simulation.dt / mass < 0.51
+    assert np.abs(np.diff(velocity)).sum() < 1.02 * np.ptp(velocity)
+    assert velocity[-1] == pytest.approx(1.0, rel=1e-3)
+
+
 @pytest.mark.full
 def test_a_wave_in_water_goes_on_into_elastic_steel():
     """Stress and velocity behind the transmitted wave, 2 Z2/(Z1 + Z2) and 2 Z1/(Z1 + Z2) of the incident ones; to these
