@@ -355,13 +355,14 @@ def test_a_spring_that_was_never_pressed_does_not_push():
     assert np.abs(part._acceleration).max() > 0.0
 
 
-@pytest.mark.parametrize(("damage", "pieces"), [(0.0, 1), (0.5, 2)])
-def test_an_opening_that_no_particle_sees_as_its_stretch_is_a_crack(damage, pieces):
-    """Among damaged particles: where a crack jumps from one row to another, none of them has failed."""
+@pytest.mark.parametrize(("around", "pieces"), [(0.0, 1), (0.5, 2)])
+def test_an_opening_that_no_particle_sees_as_its_stretch_is_a_crack(around, pieces):
+    """Beside damaged particles: the ends need not be, where the failed ones between them have become debris."""
     part = failed_block(COPPER_EOS)
     c = part.columns
-    c["damage"][:] = damage
+    c["damage"][:] = 0.0
     c["damage"][0] = 1.0  # elsewhere
+    c["around"][:] = around
     c["position"][:, 0] += np.where(c["reference"][:, 0] > 0.0, 2.5e-3, 0.0)
     part.prepare()
     found = part.pieces()["particles"]

@@ -31,7 +31,7 @@ from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigen
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
 # Columns of `facts`: what ghosts are told besides.
-VOLUME, BODY, DAMAGE, LOOSE, EXPOSED, DEBRIS, PARTED, STRETCH, CRACK = range(9)
+VOLUME, BODY, DAMAGE, AROUND, LOOSE, EXPOSED, DEBRIS, PARTED, STRETCH, CRACK = range(10)
 OPENED = 0.5  # spacings: an opening that neither end of a bond sees as its own stretch
 SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
@@ -182,8 +182,9 @@ def crack(
 def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, partner, bond, parted, lost):
     """Cut the stretched bonds that cross a crack or whose ends have failed otherwise, and those of a loose particle.
 
-    A bond between damaged particles that is half a spacing longer than the stretch of either makes it crosses a crack
-    as well, one that has no face at its ends: where it jumps from one row of particles to another.
+    A bond beside damaged particles that is half a spacing longer than the stretch of either end makes it crosses a
+    crack as well, one that has no face at its ends: it jumps from one row of particles to another, or its faces have
+    become debris. The stretch of a failed end is the crack's and not the material's.
 
     lost[i] = how many bonds particle i has lost; the others keep their order. parted[i] = length of the shortest that
     it has ever lost.
@@ -200,7 +201,7 @@ def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, 
             failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and faces
             stretched = dot(x, x) > dot(X, X)
             widest = max(facts[i, STRETCH], facts[j, STRETCH]) * sqrt(dot(X, X)) + OPENED * spacing[body[i]]
-            opened = min(facts[i, DAMAGE], facts[j, DAMAGE]) > 0.0 and dot(x, x) > widest * widest
+            opened = min(facts[i, AROUND], facts[j, AROUND]) > 0.0 and dot(x, x) > widest * widest
             if not (((crossed or failed) and stretched) or opened or facts[i, LOOSE] > 0.0 or facts[j, LOOSE] > 0.0):
                 if kept < n:
                     key[i, kept] = key[i, n]
@@ -225,6 +226,14 @@ def has_failed(damage, i):
     if FAILS:
         return damage[i] >= 1.0
     return False
+
+
+@helper
+def own_stretch(deformation, damage, i):
+    """Largest stretch of the material of a particle; what a failed one sees besides is the opening of cracks."""
+    if FAILS:
+        return largest_stretch(matrix_of(deformation, i)) if damage[i] < 1.0 else 1.0
+    return 1.0
 
 
 @driver
@@ -266,17 +275,18 @@ def mark_debris(begin, end, facts, mark):
 
 
 @driver
-def tell(begin, end, volume, body, loose, exposed, bond_count, parted, deformation, crack, damage, facts):
+def tell(begin, end, volume, body, around, loose, exposed, bond_count, parted, deformation, crack, damage, facts):
     """facts[i] = what others must know of a particle, in the columns above."""
     for i in range(begin, end):
         facts[i, VOLUME] = volume[i]
         facts[i, BODY] = 1.0 * body[i]
         facts[i, DAMAGE] = damage[i] if FAILS else 0.0
+        facts[i, AROUND] = around[i]
         facts[i, LOOSE] = 1.0 if loose[i] > 0 else 0.0
         facts[i, EXPOSED] = 1.0 if exposed[i] > 0 else 0.0
         facts[i, DEBRIS] = 1.0 if bond_count[i] == 0 else 0.0
         facts[i, PARTED] = parted[i]
-        facts[i, STRETCH] = largest_stretch(matrix_of(deformation, i)) if FAILS else 1.0
+        facts[i, STRETCH] = own_stretch(deformation, damage, i)
         for d in static_range(DIMENSIONS):
             facts[i, CRACK + d] = crack[i, d]
 

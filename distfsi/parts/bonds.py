@@ -48,7 +48,7 @@ DRIVERS = (
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 LOOSE_BELOW = 0.1  # least eigenvalue of the moment, below which the gradient's correction fades
 ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
-FACTS = 8  # columns of what ghosts are told besides, see kernels/bonds.py
+FACTS = 9  # columns of what ghosts are told besides, see kernels/bonds.py
 
 
 class TotalLagrangian:
@@ -234,7 +234,7 @@ class TotalLagrangian:
         material = c.read("density", "sound_speed", "plastic_strain", "deviator", "pressure", "viscous_pressure")
         shape = c.read("correction", "deformation", "position", "reference", "loose", "around")
         self._run(n, "stress_bonds", *c.read("body"), self._strength, *material, *shape, tension)
-        known = c.read("volume", "body", "loose", "exposed", "bond_count", "parted", "deformation", "crack")
+        known = c.read("volume", "body", "around", "loose", "exposed", "bond_count", "parted", "deformation", "crack")
         self._run(n, "tell", *known, self._damage(c), facts)
         return [(*c.read("reference"), "position"), (tension, parity), (facts, (*((),) * FACTS, *vector))]
 
