@@ -30,7 +30,7 @@ FAILURE = (
 )
 SMOOTHING = "solid.smoothing=1.3"  # so that the bonds that a crack cuts take its energy
 SMALLEST = 8  # particles of a fragment that is measured
-SHOWN = (10e-6, 20e-6, 30e-6, 40e-6)  # the times of the pictures [s]
+SHOWN, WINDOW = (10e-6, 20e-6, 30e-6, 40e-6), 0.1  # the times of the pictures [s] and the width that they show [m]
 
 
 @dataclass(frozen=True)
@@ -103,11 +103,12 @@ def maps(directory: Path, what: str) -> list[Picture]:
     """Fragments, or speeds of gas and wall, at the times SHOWN (after the paper's Figs. 25, 26)."""
     pictures = []
     particles, cells = series(directory, "particles"), series(directory, "cells")
-    for shown in SHOWN:
-        number = min(range(len(cells)), key=lambda n: abs(cells[n][0] - shown))
+    for instant in SHOWN:
+        number = min(range(len(cells)), key=lambda n: abs(cells[n][0] - instant))
         time, path = cells[number]
         _, fields, lower, spacing = read_cells(path)
-        values = _drawn(fields, read_particles(particles[number][1])[1], lower, spacing, what)
+        shown = slice(int(WINDOW / spacing[0]))
+        values = _drawn(fields, read_particles(particles[number][1])[1], lower, spacing, what)[shown, shown]
         size = [1e3 * n * s for n, s in zip(values.shape[::-1], spacing[:2], strict=True)]
         title = {"speed": "speed [m/s]", "piece": "fragments"}[what]
         bar = "" if what == "speed" else None
@@ -117,7 +118,7 @@ def maps(directory: Path, what: str) -> list[Picture]:
 
 
 def _drawn(cells, particles, lower, spacing, what) -> np.ndarray:
-    """Speeds of gas and wall, or the numbers of the fragments, in the cells."""
+    """Speeds of gas and wall, or the colors of the fragments, in the cells."""
     x = particles["position"][:, :2]
     place = tuple(((x - np.array(lower[:2])) / np.array(spacing[:2])).astype(int).T[::-1])
     speed = np.linalg.norm(cells["velocity"][0], axis=-1)
@@ -125,7 +126,10 @@ def _drawn(cells, particles, lower, spacing, what) -> np.ndarray:
         speed[place] = np.hypot(*particles["velocity"][:, :2].T)
         return speed
     numbers = np.full(speed.shape, np.nan)
-    numbers[place] = np.unique(particles["piece"], return_inverse=True)[1] * 7 % 20
+    pieces, count = np.unique(particles["piece"], return_counts=True)
+    large = count >= SMALLEST
+    color = np.where(large, 5 + 7 * np.cumsum(large) % 20, 0)  # neighbours far from each other, dust alike
+    numbers[place] = color[np.searchsorted(pieces, particles["piece"])]
     return numbers
 
 
