@@ -179,14 +179,17 @@ def all_boxes(blocks):
     return np.where(first == 0, -np.inf, lower + first * spacing), np.where(end >= cells, np.inf, lower + end * spacing)
 
 
-def check_own(blocks, everything, mine):
-    """`mine` are the particles of this rank's blocks, sorted by (block, id), with all their values."""
+def check_own(blocks, everything, mine, home):
+    """`mine` are the particles of this rank's blocks, with all their values, and `home` their blocks."""
     block = expected_blocks(blocks, everything["position"])
     order = np.lexsort((everything["id"], block))
     order = order[blocks.owners[block[order]] == blocks.communicator.rank]
+    np.testing.assert_array_equal(np.sort(home.here()), block[order])
+    rows = np.lexsort((mine["id"], home.here()))
     for name, column in everything.items():
         assert mine[name].dtype == column.dtype
-        np.testing.assert_array_equal(mine[name], column[order], err_msg=name)
+        np.testing.assert_array_equal(mine[name][rows], column[order], err_msg=name)
+    return rows
 
 
 def check_particles(communicator, grid, block_cells, number, reach):
@@ -199,16 +202,18 @@ def check_particles(communicator, grid, block_cells, number, reach):
     mine = {name: column[np.arange(number) % holders == communicator.rank] for name, column in everything.items()}
     mine = Columns(device, mine)
     block = exchange.migrate(mine)
-    check_own(blocks, everything, mine)
+    assert np.all(np.diff(check_own(blocks, everything, mine, block)) == 1)  # sorted
     move = rng.normal(0.0, 0.1, everything["position"].shape)
     move_of = dict(zip(everything["id"].tolist(), move, strict=True))
     everything["position"] += move
     if len(mine["id"]):
         mine["position"] += np.array([move_of[i] for i in mine["id"].tolist()])
+    before = mine["id"]
     block = exchange.migrate(mine, block)
-    check_own(blocks, everything, mine)
+    check_own(blocks, everything, mine, block)
+    assert communicator.size > 1 or mine["id"] is before  # nobody came or left, so all stay in their rows
     assert exchange.migrate(mine, block) is block  # nothing moved
-    check_own(blocks, everything, mine)
+    check_own(blocks, everything, mine, block)
     nothing = np.empty(0, dtype=np.int64)
     check_ghost_particles(
         blocks, everything, mine, exchange.ghosts(mine["position"], mine["id"], reach), reach, nothing

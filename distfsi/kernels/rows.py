@@ -48,13 +48,13 @@ def find_bounds(begin, end, chunk, values, width, bounds):
 
 
 @driver
-def add_rows(begin, end, first, width, values, sums):
-    """sums[c] = sum of the rows first[c] … first[c + 1] of the values, one after the other."""
+def add_rows(begin, end, first, rows, width, values, sums):
+    """sums[c] = sum of the values in rows[first[c]] … rows[first[c + 1] - 1], one after the other."""
     for c in range(begin, end):
         for k in range(width):
             total = 0.0
             for i in range(first[c], first[c + 1]):
-                total += values[i * width + k]
+                total += values[rows[i] * width + k]
             sums[c, k] = total
 
 

@@ -39,7 +39,10 @@ class ParticleExchange:
         self.staged: Any = None  # memory that the last exchange may still read
 
     def migrate(self, columns: Columns, block: Pair | None = None) -> Pair:
-        """Collective. All particles to the ranks that own their blocks, sorted by (block, id).
+        """Collective. All particles to the ranks that own their blocks.
+
+        Rows are sorted by (block, id) where particles have come or gone; where they only changed blocks of this rank,
+        all stay in their rows, so that what refers to rows remains valid.
 
         Each column is (n,) or (n, k), with the same names and dtypes on all ranks, among them "id" (n,) int64 and
         "position" (n, dimensions) [m]. Returns the curve index (own,) of each particle's block; `block` is what the
@@ -47,7 +50,7 @@ class ParticleExchange:
         """
         communicator, device = self.blocks.communicator, self.device
         (position,) = columns.read("position")
-        count = position.shape[0]
+        count, unsorted = position.shape[0], block is None
         block = Pair(device, np.full(count, -1)) if block is None else block
         moved = self._some_moved(position, block)
         now = block.here() if moved else np.empty(0, dtype=np.int64)
@@ -58,6 +61,8 @@ class ParticleExchange:
         if not moved and not route.arriving:
             return block
         now, there = block.here(), device.array(leaving)
+        if not (unsorted or len(leaving) or route.arriving):
+            return Pair(device, now)
         arrived = route.brought({name: device.get(self.rows.taken(*columns.read(name), there)) for name in columns})
         stays = np.flatnonzero(self.blocks.owners[now] == communicator.rank)
         home = np.concatenate([now[stays], self.blocks.block_of(arrived["position"])])
@@ -239,7 +244,7 @@ class Images:
 
 @dataclass
 class GhostPlan:
-    """This rank's particles, then its ghosts in (block, id) order, then the images of both.
+    """This rank's particles, then its ghosts in the order of their ranks and rows there, then the images of both.
 
     own     number of this rank's particles
     count   number of particles, ghosts and images

@@ -54,7 +54,7 @@ class Solid:
     """All particles of this rank. A step is prepare(), time_step(), advance(dt), push(impulse), migrate(); of these a
     sub-step is the first three.
 
-    columns  this rank's particles on host and device, sorted by (block, id): id, body, fixed (n,), position [m],
+    columns  this rank's particles on host and device, in any order: id, body, fixed (n,), position [m],
              velocity [m/s] (n, D), mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the
              materials remember (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s],
              damage (n,) … Velocities belong to half a step before the positions.
@@ -218,8 +218,13 @@ class Solid:
         self._home, bodies = home, self.given.shape[1]
         self._block = home.here() - self.blocks.first
         group = self._block * bodies + self.columns["body"]
+        self._order = np.lexsort((self.columns["id"], group))
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
-        self._groups = Groups(self.team, self.kernels, sizes)
+        self._groups = Groups(self.team, self.kernels, sizes, self._order)
+
+    def _sorted(self, *names: str) -> dict[str, np.ndarray]:
+        """The columns of these names by (block, body, id), an order that depends on nothing else."""
+        return {name: self.columns[name][self._order] for name in names}
 
     def _deform(self, dt: float, gradient: Any) -> None:
         c = self.columns
@@ -276,7 +281,10 @@ class Solid:
     def pieces(self) -> dict[str, np.ndarray] | None:
         """Collective. The pieces that intact bonds hold together: see parts/pieces.py; None without bonds."""
         self.label_pieces()
-        return pieces.table(self.columns, self._block, self.blocks) if "piece" in self.columns else None
+        if "piece" not in self.columns:
+            return None
+        c = self._sorted("piece", "mass", "position", "velocity")
+        return pieces.table(c, self._block[self._order], self.blocks)
 
     def label_pieces(self) -> None:
         """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
@@ -297,7 +305,7 @@ class Solid:
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
         sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
-        return {"particles": dict(self.columns), "sums": sums}
+        return {"particles": self._sorted(*self.columns), "sums": sums}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Collective. Go on from a snapshot, whose particles may be on any rank."""
@@ -310,9 +318,9 @@ class Solid:
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,), and the stress (n, 6)
-        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all."""
-        c, D = self.columns, self.dimensions
-        c = c if chosen is None else {name: column[chosen] for name, column in c.items()}
+        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all, by block, body and id."""
+        D, rows = self.dimensions, self._order if chosen is None else chosen
+        c = {name: column[rows] for name, column in self.columns.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
         names += [name for name in ("piece",) if name in c]
