@@ -7,6 +7,7 @@ gone is debris: from then on the updated Lagrangian form moves it among other de
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,7 +49,14 @@ DRIVERS = (
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 LOOSE_BELOW = 0.1  # least eigenvalue of the moment, below which the gradient's correction fades
 ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
+AT_A_TIME = 16384  # particles whose bonds are made together
+NONE = np.iinfo(np.int64).max  # no key
 FACTS = 9  # columns of what ghosts are told besides, see kernels/bonds.py
+
+
+def chunks_of(rows: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """First row and rows, AT_A_TIME of them."""
+    return ((begin, rows[begin : begin + AT_A_TIME]) for begin in range(0, len(rows), AT_A_TIME))
 
 
 class TotalLagrangian:
@@ -98,12 +106,8 @@ class TotalLagrangian:
         """Collective. Make the bonds of the particles where they are now, and add the columns."""
         n, D, device = len(c["id"]), self._dimensions, self._device
         c["reference"], c["volume"] = c["position"].copy(), c["mass"] / c["density"]
-        first, key = self._near_each_other(c, exchange)
-        count = np.bincount(first, minlength=n)
-        width = int(self._communicator.maximum(np.array([count.max(initial=1)]))[0])
-        bonds = np.full((n, width), -1)
-        bonds[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = key
-        c["bonds"], c["bond_count"] = bonds, count
+        c["bonds"] = bonds = self._near_each_other(c, exchange)
+        c["bond_count"] = np.count_nonzero(bonds >= 0, axis=1)
         c["viscous_pressure"], c["void"], c["around"] = np.zeros(n), np.zeros(n), np.zeros(n)
         c["crack"], c["parted"] = np.zeros((n, D)), np.full(n, self._support)
         c["loose"] = np.zeros(n, dtype=np.int64)
@@ -126,13 +130,15 @@ class TotalLagrangian:
         plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.asked(c))
         id = plan.key.here[plan.key.here % IMAGES == 0] // IMAGES
         order = np.argsort(id, kind="stable")
-        bonds = c["bonds"]
-        first, place = np.nonzero(bonds >= 0)
-        second = order[np.searchsorted(id, bonds[first, place] // IMAGES, sorter=order)]
-        c["piece"] = pieces.label(id, np.stack([first, second]), plan, self._device, self._communicator)
+        pairs = [np.empty((2, 0), dtype=np.int64)]
+        for begin, bonds in chunks_of(c["bonds"]):
+            first, place = np.nonzero(bonds >= 0)
+            second = order[np.searchsorted(id, bonds[first, place] // IMAGES, sorter=order)]
+            pairs.append(np.stack([begin + first, second])[:, begin + first < second])  # each bond once
+        c["piece"] = pieces.label(id, np.concatenate(pairs, axis=1), plan, self._device, self._communicator)
 
-    def _near_each_other(self, c: Columns, exchange: ParticleExchange) -> tuple[np.ndarray, np.ndarray]:
-        """Own rows and keys of all pairs of neighbours of one body, in ascending order."""
+    def _near_each_other(self, c: Columns, exchange: ParticleExchange) -> np.ndarray:
+        """(own, width) keys of each particle's neighbours of its body, ascending, and then -1."""
         device = self._device
         plan = exchange.ghosts(*c.read("position"), c["id"], self._support)
         state = device.array(np.column_stack([c["mass"], c["density"], c["h"]]))
@@ -140,16 +146,23 @@ class TotalLagrangian:
         given = [(*c.read("position"), "position"), (state, ((),) * 3), (body, ((),))]
         position, state, body = plan.exchange(given)
         self._search.find(plan.own, position, state, plan.key.there, self._support)
-        table, body, key = device.get(self._search.table), device.get(body).astype(np.int64), plan.key.here
-        first, place = np.nonzero(np.arange(table.shape[1]) < device.get(self._search.count)[:, None])
-        second = table[first, place]
+        table, count, body = device.get(self._search.table), device.get(self._search.count), device.get(body)
         through = self._through_planes(c, exchange)
-        self._through = device.array(through)
+        self._through, key = device.array(through), plan.key.here
+        body = body.astype(np.int64)
         side = body + len(through) * (key % IMAGES & ~through[body] > 0)  # an image where a body ends is another's
-        bonded = side[second] == body[first]
-        first, key = first[bonded], key[second[bonded]]
-        order = np.lexsort((key, first))
-        return first[order], key[order]
+        bonds = []
+        for begin, near in chunks_of(table):
+            rows = slice(begin, begin + len(near))
+            found = np.arange(table.shape[1]) < count[rows, None]
+            near = np.where(found, near, 0)
+            bonded = found & (side[near] == body[rows, None])
+            keys = np.sort(np.where(bonded, key[near], NONE), axis=1)
+            bonds.append(keys[:, : bonded.sum(axis=1).max(initial=1)])
+        width = int(self._communicator.maximum(np.array([max((b.shape[1] for b in bonds), default=1)]))[0])
+        padded = [np.pad(b, ((0, 0), (0, width - b.shape[1])), constant_values=NONE) for b in bonds]
+        keys = np.concatenate([np.empty((0, width), dtype=np.int64), *padded])
+        return np.where(keys == NONE, -1, keys)
 
     def _through_planes(self, c: Columns, exchange: ParticleExchange) -> np.ndarray:
         """(bodies,) the axes, as bits, along which a body goes on behind a symmetry plane."""
