@@ -130,18 +130,15 @@ class Sizes:
 
     @property
     def error(self) -> np.ndarray:
-        """Standard error of the mean."""
+        """Standard error of the mean; breaks are whole numbers, so that their deviation is at least half a break."""
         counts = self.counts
-        return self.mean * counts.std(axis=1, ddof=1) / math.sqrt(counts.shape[1]) / counts.mean(axis=1)
+        deviation = np.maximum(counts.std(axis=1, ddof=1), 0.5)
+        return self.mean * deviation / math.sqrt(counts.shape[1]) / counts.mean(axis=1)
 
     @property
     def exponent(self) -> tuple[float, float]:
         """q of size ~ rate^-q by weighted least squares, and its standard error."""
-        x, y, weight = (
-            np.log(self.rates),
-            np.log(self.mean),
-            (self.mean / np.maximum(self.error, 1e-3 * self.mean)) ** 2,
-        )
+        x, y, weight = np.log(self.rates), np.log(self.mean), (self.mean / self.error) ** 2
         x0 = (weight * x).sum() / weight.sum()
         spread = (weight * (x - x0) ** 2).sum()
         return -float((weight * (x - x0) * y).sum() / spread), float(1.0 / math.sqrt(spread))
