@@ -175,12 +175,12 @@ def write(found: Sequence[Fragments]) -> None:
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
-    """One specimen on few cells up to 12 us, only to see that it breaks."""
+    """One specimen on few cells up to 24 us, only to see that it breaks."""
     coarse = (
         "domain.upper=[0.07,0.07]",
         "domain.cells=[35,35]",
         'solid.bodies.tube.spacing="1 mm"',
-        'time.end="12 us"',
+        'time.end="24 us"',
     )
     found = fragments(burst(communicator, SEEDS[0], [*coarse, *overrides]), SEEDS[0])
     print(line(found), flush=True)
