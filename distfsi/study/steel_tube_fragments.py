@@ -99,6 +99,16 @@ def line(f: Fragments) -> str:
     return head + "{:9.2f} {:9.2f} {:9.0f} {:9.0f}".format(*means)
 
 
+def together(found: Sequence[Fragments]) -> str:
+    """Mean and standard deviation over the fragments of all specimens."""
+    names = ("width", "thickness", "speed")
+    width, thickness, speed = (np.concatenate([getattr(f, name) for f in found]) for name in names)
+    return (
+        f"{len(width)} fragments: width {1e3 * width.mean():.2f} ± {1e3 * width.std():.2f} mm, thickness"
+        f" {1e3 * thickness.mean():.2f} ± {1e3 * thickness.std():.2f} mm, {speed.mean():.0f} ± {speed.std():.0f} m/s"
+    )
+
+
 def maps(directory: Path, what: str) -> list[Picture]:
     """Fragments, or speeds of gas and wall, at the times SHOWN (after the paper's Figs. 25, 26)."""
     pictures = []
@@ -141,6 +151,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     found = [fragments(directory, seed) for seed, directory in directories.items()]
     print("seed  broken [us]  r/r0  fragments  width [mm]  thickness  speed [m/s]  mass [%]")
     print("\n".join(line(f) for f in found))
+    print(together(found))
     for source in TUBE_FRAGMENTS:
         print(f"{source.source}: width {1e3 * source.width} mm, thickness {1e3 * source.thickness} mm, {source.speed}")
     write(found)
