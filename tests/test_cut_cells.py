@@ -400,23 +400,20 @@ def positive(case):
     return W[0].min() > 0.0 and W[-1].min() > 0.0
 
 
-GAPS = [(3.0, 0.8, 1.3), pytest.param(1.0, 1.5, 2.2, marks=pytest.mark.full)]
-
-
-@pytest.mark.parametrize(("thickness", "narrow", "wide"), GAPS)
-def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, narrow, wide):
-    """Two halves of a plate part, pressure 10 : 1. Widths in cells; a plate of one cell counts as thicker than it is on
-    all sides, so there it takes two."""
+@pytest.mark.parametrize("middle", [0.48, pytest.param(0.5, marks=pytest.mark.full)])
+@pytest.mark.parametrize("thickness", [1.0, *(pytest.param(t, marks=pytest.mark.full) for t in (0.5, 1.5, 3.0))])
+def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, middle):
+    """Two halves of a plate part, pressure 10 : 1, between two rows of corners or in one: 0.6 to 1.3 cells wide."""
     h, speed = 1.0 / 24, 0.2
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     halves = [
-        rigid(Box((low, -0.3), (high, 0.48)), 0.5 * h, (0.0, -speed)),
-        rigid(Box((low, 0.48), (high, 1.3)), 0.5 * h, (0.0, speed)),
+        rigid(Box((low, -0.3), (high, middle)), 0.5 * h, (0.0, -speed)),
+        rigid(Box((low, middle), (high, 1.3)), 0.5 * h, (0.0, speed)),
     ]
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(10.0, 10.0, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
     case = coupled(halves, regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24)
     before, width, opened = low_side(case)[0], 0.0, None
-    while width < wide + 0.5:
+    while width < 1.6:
         case.step()
         width = 2.0 * speed * case.simulation.time / h
         mass, shut_in, open_way = low_side(case)
@@ -424,7 +421,7 @@ def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, narrow, wid
             opened = width
         assert opened or mass / before - 1.0 < 1e-12
         assert positive(case)
-    assert narrow < opened < wide
+    assert 0.6 < opened < 1.3
 
 
 TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in ((1.0, 10.0), (3.0, 100.0)))]

@@ -3,7 +3,7 @@ and which cells join which.
 
 Particles are smoothed with a kernel; inverting its plane profile turns the sum at a corner into a distance that is
 linear in the positions of the particles. Where a body is thinner than the diagonal of a cell its particles count as
-balls, so that no cell sees both of its sides.
+balls, so that no cell sees both of its sides; these are cut off at edges, so that cracks open.
 
 Cells are named as in kernels/coupling.py. Cells around a block are looked at in its ghosts; corners outside the domain
 are seen in the mirror of its sides.
@@ -11,7 +11,8 @@ are seen in the mirror of its sides.
 
 from math import sqrt
 
-from distfsi.device.markers import driver, helper, load
+from distfsi.device.markers import driver, helper, load, workspace
+from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
 from distfsi.kernels.gather import any_particle, bins_around
 from distfsi.physics.apertures import open_cell, open_face
@@ -20,6 +21,8 @@ from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
 
+NEARBY = 1.2  # kernel radii from where a body is thick to the particles of its corners
+INSIDE, EDGE = 0.04, 0.09  # of a kernel's radius, to the mean of what is around: far from an edge, and at one
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
 
 SHUT = DEEP  # a cell whose faces are closed, with fluid in it
@@ -32,42 +35,72 @@ NEAR, CUT = 1, 2
 
 @driver
 def fill_kernel(begin, end, filled, radius, volume, position, start, order, lower, size, low, window, strides):
-    """filled[p] = share of the broad kernel around a particle that is filled with particles' `volume` (n, 1)."""
+    """filled (n, 1 + D) = share of the broad kernel around a particle that particles' `volume` (n, 1) fills, and the
+    mean way [m] from the particle to what fills it."""
     for p in range(begin, end):
-        x, total = tuple(position[p, d] for d in static_range(DIMENSIONS)), 0.0
+        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
+        for d in range(1 + DIMENSIONS):
+            filled[p, d] = 0.0
         bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
         for k in range(bz[0], bz[1]):
             for j in range(by[0], by[1]):
                 row = k * strides[2] + j * strides[1]
                 for n in range(start[row + bx[0]], start[row + bx[1]]):
                     q = order[n]
-                    dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
-                    total += volume[q, 0] * broad_weight(dot(dx, dx), radius)
-        filled[p] = total
+                    way = tuple(position[q, d] - x[d] for d in static_range(DIMENSIONS))
+                    part = volume[q, 0] * broad_weight(dot(way, way), radius)
+                    filled[p, 0] += part
+                    for d in static_range(DIMENSIONS):
+                        filled[p, 1 + d] += part * way[d]
+        for d in range(DIMENSIONS):
+            filled[p, 1 + d] = filled[p, 1 + d] / max(filled[p, 0], 1e-300)
 
 
 @driver
 def thicken(
-    begin, end, ball, filled, radius, ball_radius, thin, thick, volume, position, start, order, lower, size, low,
-    window, strides,
+    begin, end, ball, filled, radius, largest, thin, thick, volume, position, start, order, lower, size, low, window,
+    strides,
 ):  # fmt: skip
-    """ball[p] = radius [m] of a particle's ball: `ball_radius` in a body so thin that no kernel nearby is filled by
-    more than the share `thin`, 0 where one is by `thick`."""
+    """ball (n, 2 + D) = radius [m] of a particle's ball, how far it goes outwards [m], and where that is.
+
+    The radius is `largest` in a body so thin that no kernel nearby is filled by more than the share `thin`, 0 where one
+    is by `thick`. Outwards is away from what is around, on the mean over the particles around: across a thin body that
+    mean is small, and at its edge it points along it. There the ball ends where the particle's cube does.
+    """
+    lean = workspace(DIMENSIONS)
     for p in range(begin, end):
-        ball[p], most = 0.0, filled[p]
+        most, total, around = filled[p, 0], 0.0, NEARBY * radius
+        for d in range(2 + DIMENSIONS):
+            ball[p, d] = 0.0
         if most >= thick or volume[p, 0] <= 0.0:
             continue
+        for d in range(DIMENSIONS):
+            lean[d] = 0.0
         x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
+        bx, by, bz = bins_around(x, tuple(around for _ in static_range(DIMENSIONS)), lower, size, low, window)
         for k in range(bz[0], bz[1]):
             for j in range(by[0], by[1]):
                 row = k * strides[2] + j * strides[1]
                 for n in range(start[row + bx[0]], start[row + bx[1]]):
                     q = order[n]
                     dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
-                    if dot(dx, dx) < radius * radius:
-                        most = max(most, filled[q])
-        ball[p] = ball_radius * min(max((thick - most) / (thick - thin), 0.0), 1.0)
+                    distance2 = dot(dx, dx)
+                    if distance2 < around * around:
+                        most = max(most, filled[q, 0])
+                        part = volume[q, 0] * broad_weight(distance2, radius)
+                        total += part
+                        for d in static_range(DIMENSIONS):
+                            lean[d] += part * filled[q, 1 + d]
+        own = largest * min(max((thick - most) / (thick - thin), 0.0), 1.0)
+        if own <= 0.0:
+            continue
+        mean = tuple(lean[d] / total for d in static_range(DIMENSIONS))
+        length = sqrt(dot(mean, mean))
+        cut = min(max((length / radius - INSIDE) / (EDGE - INSIDE), 0.0), 1.0)
+        ball[p, 0] = own
+        ball[p, 1] = own - cut * max(own - 0.5 * side_of_cube(volume[p, 0]), 0.0)
+        for d in static_range(DIMENSIONS):
+            ball[p, 2 + d] = -mean[d] / max(length, 1e-300)
 
 
 @helper
@@ -101,8 +134,9 @@ def distance_at(
                 distance2 = dot(dx, dx)
                 if distance2 < radius * radius:
                     filled += volume[p, 0] * immersed_weight(distance2, radius)
-                if ball[p] > 0.0 and distance2 < search * search:
-                    nearest = min(nearest, sqrt(distance2) - ball[p])
+                if ball[p, 0] > 0.0 and distance2 < search * search:
+                    outwards = tuple(ball[p, 2 + d] for d in static_range(DIMENSIONS))
+                    nearest = min(nearest, max(sqrt(distance2) - ball[p, 0], dot(dx, outwards) - ball[p, 1]))
     return min(distance_of(filled, profile, radius), nearest)
 
 

@@ -294,8 +294,8 @@ class CutCells:
         plan = self._plan if number is c["id"] else self._ghosts(point, number)
         position, volume = plan.exchange([(point, "position"), (volume, ((),))])
         bins = wall.sort(position, plan.key.there)
-        (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((),))])
-        (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((),))])
+        (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((), *vector))])
+        (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((), (), *vector))])
         wall.cut(position, volume, ball, bins)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:

@@ -22,7 +22,6 @@ SMOOTHING_RADIUS = 1.5  # in cells, of the kernel whose sum gives the distance
 COARSEST = 3.0  # particle spacings that this radius spans at least
 MARGIN = 0.15  # of a cell, on each side: what thin bodies are thicker than must be, as they move in a step
 THIN, THICK = 0.1, 0.45  # of a cell, beyond its diagonal: the thickness up to which a body is thin, and from which not
-NEARBY = 1.2  # kernel radii from where a body is thick to the particles of its corners
 PROFILE_POINTS = 1025
 DRIVERS = (
     *search.DRIVERS,
@@ -119,25 +118,25 @@ class WallGeometry:
         return self._cells.sort(position, key, self._least_spacing)[1]
 
     def fill(self, own: int, position: Any, volume: Any, bins: SearchCells) -> Any:
-        """Share (own,) of the broad kernel around each of the first `own` particles that is filled."""
-        filled = self.team.empty(own)
+        """Share of the broad kernel around each of the first `own` particles that is filled, and the mean way [m] to
+        what fills it, (own, 1 + D)."""
+        filled = self.team.empty((own, 1 + self.blocks.grid.dimensions))
         self.team.run(self.kernels.fill_kernel, own, filled, self.radius, volume, position, *bins)
         return filled
 
     def thicken(self, own: int, filled: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
-        """Radius (own,) [m] of the balls as which particles of thin bodies count; `filled` of all particles."""
-        ball = self.team.empty(own)
+        """Balls (own, 2 + D) as which particles of thin bodies count (kernels/cut_geometry.py); `filled` of all."""
+        ball = self.team.empty((own, 2 + self.blocks.grid.dimensions))
         self.team.run(
-            self.kernels.thicken, own, ball, filled, NEARBY * self.radius, self.ball, *self._thickness, volume,
-            position, *bins,
-        )  # fmt: skip
+            self.kernels.thicken, own, ball, filled, self.radius, self.ball, *self._thickness, volume, position, *bins
+        )
         return ball
 
     def cut(self, position: Any, volume: Any, ball: Any, bins: SearchCells) -> None:
         """The new geometry becomes the old one, and that of these particles the new one."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
         run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.there
-        far = self.search if self._rows.largest(ball, 0.0) > 0.0 else self.radius
+        far = self.search if self._rows.largest(ball.reshape(-1), 0.0) > 0.0 else self.radius
         place = (bins.start, *bins[2:], self.spacing, self.origin, self.extent)
         run(k.find_near, count, near, far, *place)
         run(
