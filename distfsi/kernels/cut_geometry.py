@@ -14,9 +14,9 @@ from math import sqrt
 from distfsi.device.markers import driver, helper, load, workspace
 from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
-from distfsi.kernels.gather import any_particle, bins_around
+from distfsi.kernels.gather import any_particle, bins_around, sum_particles
 from distfsi.physics.apertures import open_cell, open_face
-from distfsi.physics.immersed import broad_weight, immersed_weight
+from distfsi.physics.immersed import broad_weight
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
@@ -39,8 +39,7 @@ def fill_kernel(begin, end, filled, radius, volume, position, start, order, lowe
     mean way [m] from the particle to what fills it."""
     for p in range(begin, end):
         x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        for d in range(1 + DIMENSIONS):
-            filled[p, d] = 0.0
+        share, moment = 0.0, tuple(0.0 for _ in static_range(DIMENSIONS))
         bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
         for k in range(bz[0], bz[1]):
             for j in range(by[0], by[1]):
@@ -48,12 +47,14 @@ def fill_kernel(begin, end, filled, radius, volume, position, start, order, lowe
                 for n in range(start[row + bx[0]], start[row + bx[1]]):
                     q = order[n]
                     way = tuple(position[q, d] - x[d] for d in static_range(DIMENSIONS))
-                    part = volume[q, 0] * broad_weight(dot(way, way), radius)
-                    filled[p, 0] += part
-                    for d in static_range(DIMENSIONS):
-                        filled[p, 1 + d] += part * way[d]
-        for d in range(DIMENSIONS):
-            filled[p, 1 + d] = filled[p, 1 + d] / max(filled[p, 0], 1e-300)
+                    distance2 = dot(way, way)
+                    if distance2 < radius * radius:
+                        part = volume[q, 0] * broad_weight(distance2, radius)
+                        share += part
+                        moment = tuple(moment[d] + part * way[d] for d in static_range(DIMENSIONS))
+        filled[p, 0] = share
+        for d in static_range(DIMENSIONS):
+            filled[p, 1 + d] = moment[d] / max(share, 1e-300)
 
 
 @driver
@@ -103,10 +104,19 @@ def thicken(
             ball[p, 2 + d] = -mean[d] / max(length, 1e-300)
 
 
+@driver
+def mark_balls(begin, end, ball, mark):
+    """mark[p] = 1 where a particle counts as a ball, else 0."""
+    for p in range(begin, end):
+        mark[p] = 1 if ball[p, 0] > 0.0 else 0
+
+
 @helper
 def distance_of(filled, profile, radius):
     """Distance [m] of a plane wall that fills this share of the kernel; profile: shares on one side of planes."""
     free = 1.0 - filled
+    if free >= 1.0 or free <= 0.0:
+        return radius if free > 0.0 else -radius
     first, last = 0, len(profile) - 1
     while last - first > 1:
         middle = (first + last) // 2
@@ -119,12 +129,10 @@ def distance_of(filled, profile, radius):
 
 
 @helper
-def distance_at(
-    x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window, strides
-):  # fmt: skip
-    """Signed distance [m] of a point to the wall; |distance| <= radius."""
-    filled, nearest = 0.0, radius
-    bx, by, bz = bins_around(x, tuple(search for _ in static_range(DIMENSIONS)), lower, size, low, window)
+def nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides):
+    """Distance [m] of a point to the balls whose centers are within `reach`, or that, if it is less."""
+    nearest = reach
+    bx, by, bz = bins_around(x, tuple(reach for _ in static_range(DIMENSIONS)), lower, size, low, window)
     for k in range(bz[0], bz[1]):
         for j in range(by[0], by[1]):
             row = k * strides[2] + j * strides[1]
@@ -132,12 +140,10 @@ def distance_at(
                 p = order[n]
                 dx = tuple(x[d] - position[p, d] for d in static_range(DIMENSIONS))
                 distance2 = dot(dx, dx)
-                if distance2 < radius * radius:
-                    filled += volume[p, 0] * immersed_weight(distance2, radius)
-                if ball[p, 0] > 0.0 and distance2 < search * search:
+                if distance2 < reach * reach:
                     outwards = tuple(ball[p, 2 + d] for d in static_range(DIMENSIONS))
                     nearest = min(nearest, max(sqrt(distance2) - ball[p, 0], dot(dx, outwards) - ball[p, 1]))
-    return min(distance_of(filled, profile, radius), nearest)
+    return nearest
 
 
 @helper
@@ -168,31 +174,74 @@ def find_near(begin, end, near, search, start, lower, size, low, window, strides
             near[b] = NEAR
 
 
-@driver
-def find_distances(
-    begin, end, near, distance, radius, search, volume, ball, profile, position, start, order, lower, size, low, window,
-    strides, shape, spacing, origin, extent, cells,
-):  # fmt: skip
-    """distance = that of the corners of all cells of `near` blocks. An item is a row of corners along x."""
+@helper
+def corner_place(b, i, j, k, lower, spacing, origin, cells):
+    """Where the low corner of a cell of a block is [m], in the mirror of the domain's sides."""
+    place = (
+        mirrored(origin[b, 0] + i, cells[0]),
+        mirrored(origin[b, 1] + j, cells[1]),
+        mirrored(origin[b, 2] + k, cells[2]),
+    )
+    return tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
+
+
+@helper
+def off_corner(distance, spacing):
+    """A distance [m] that does not put the wall onto a corner."""
+    least = 1e-7 * spacing[0]
+    return least if abs(distance) < least else distance
+
+
+@helper
+def corner_row(r, shape):
+    """Block, and places along y and z in it, of a row of corners along x."""
     gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
     gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
+    b = r // ((shape[0] + uz) * (shape[1] + uy))
+    return (b, r % (shape[1] + uy) - gy, r // (shape[1] + uy) % (shape[0] + uz) - gz)
+
+
+@helper
+def corners_of_row(near, b, j, k, extent):
+    """How many corners of a row there are to look at: none in a block that is not `near`, or beyond its cells."""
+    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
+    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
+    far = near[b] == 0 or j >= extent[b, 1] + gy + uy or k >= extent[b, 2] + gz + uz
+    return 0 if far else extent[b, 0] + 5
+
+
+@driver
+def find_distances(
+    begin, end, near, distance, radius, volume, profile, position, start, order, lower, size, low, window, strides,
+    shape, spacing, origin, extent, cells,
+):  # fmt: skip
+    """distance [m] to the wall, at most `radius`, at the corners of all cells of `near` blocks, by how much of the
+    kernel is filled. An item is a row of corners along x."""
+    sums = workspace(1)
     for r in range(begin, end):
-        b = r // ((shape[0] + uz) * (shape[1] + uy))
-        j, k = r % (shape[1] + uy) - gy, r // (shape[1] + uy) % (shape[0] + uz) - gz
-        if near[b] == 0 or j >= extent[b, 1] + gy + uy or k >= extent[b, 2] + gz + uz:
-            continue
-        for i in range(-2, extent[b, 0] + 3):
-            place = (
-                mirrored(origin[b, 0] + i, cells[0]),
-                mirrored(origin[b, 1] + j, cells[1]),
-                mirrored(origin[b, 2] + k, cells[2]),
-            )
-            x = tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
-            value = distance_at(
-                x, radius, search, volume, ball, profile, position, start, order, lower, size, low, window, strides
-            )
-            least = 1e-7 * spacing[0]
-            distance[corner_at(b, i, j, k, shape)] = least if abs(value) < least else value
+        b, j, k = corner_row(r, shape)
+        for n in range(corners_of_row(near, b, j, k, extent)):
+            x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
+            sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
+            value = distance_of(sums[0], profile, radius)
+            distance[corner_at(b, n - 2, j, k, shape)] = off_corner(value, spacing)
+
+
+@driver
+def add_balls(
+    begin, end, near, distance, largest, reach, ball, position, start, order, lower, size, low, window, strides, shape,
+    spacing, origin, extent, cells,
+):  # fmt: skip
+    """distance becomes that to the balls, none more than the `largest` [m], where they are nearer. An item is a row of
+    corners along x."""
+    for r in range(begin, end):
+        b, j, k = corner_row(r, shape)
+        for n in range(corners_of_row(near, b, j, k, extent)):
+            at = corner_at(b, n - 2, j, k, shape)
+            if distance[at] > -largest:
+                x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
+                value = nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides)
+                distance[at] = min(distance[at], off_corner(value, spacing))
 
 
 @driver

@@ -296,7 +296,7 @@ class CutCells:
         bins = wall.sort(position, plan.key.there)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((), *vector))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((), (), *vector))])
-        wall.cut(position, volume, ball, bins)
+        wall.cut(position, volume, ball, plan.key.there, bins)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
         """Collective. Who needs copies of which particles or points."""

@@ -12,7 +12,7 @@ import numpy as np
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import band
 from distfsi.kernels import cut_geometry as kernels
-from distfsi.kernels.rows import count_marked, find_largest, list_marked
+from distfsi.kernels.rows import count_marked, list_marked, take_rows
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.rows import Rows
 from distfsi.parts import search
@@ -25,11 +25,13 @@ THIN, THICK = 0.1, 0.45  # of a cell, beyond its diagonal: the thickness up to w
 PROFILE_POINTS = 1025
 DRIVERS = (
     *search.DRIVERS,
-    find_largest,
+    take_rows,
     kernels.fill_kernel,
     kernels.thicken,
     kernels.find_near,
+    kernels.mark_balls,
     kernels.find_distances,
+    kernels.add_balls,
     kernels.open_up,
     kernels.mark_cut_blocks,
     kernels.find_masters,
@@ -91,7 +93,7 @@ class WallGeometry:
         self._allocate(real)
         self._rows = Rows(team, self.kernels)
         self._cells = search.CellSort(self.kernels, team, grid.lower[:D], grid.upper[:D])
-        self._least_spacing = min(grid.spacing[:D])
+        self._search_cell = 0.5 * min(grid.spacing[:D])
         steps = (1, blocks.shape[2], blocks.shape[2] * blocks.shape[1])
         around = sorted((o for o in product((-1, 0, 1), repeat=D) if any(o)), key=lambda o: (sum(map(abs, o)), o))
         self._profile, self.spacing = team.array(plane_profile(D)), team.array(np.array(grid.spacing))
@@ -99,6 +101,7 @@ class WallGeometry:
             team.array(np.array(a)) for a in (blocks.shape, grid.cells, steps, around, list(permutations(range(D))))
         )
         self.origin, self.extent = team.array(blocks.origin), team.array(blocks.extent)
+        self._grid = (self.spacing, self.origin, self.extent, self.cells)
 
     def _allocate(self, real: type) -> None:
         """The fields, of cells that are all open."""
@@ -115,7 +118,7 @@ class WallGeometry:
 
     def sort(self, position: Any, key: Any) -> SearchCells:
         """Particles by the cells of the grid they are in."""
-        return self._cells.sort(position, key, self._least_spacing)[1]
+        return self._cells.sort(position, key, self._search_cell)[1]
 
     def fill(self, own: int, position: Any, volume: Any, bins: SearchCells) -> Any:
         """Share of the broad kernel around each of the first `own` particles that is filled, and the mean way [m] to
@@ -132,17 +135,25 @@ class WallGeometry:
         )
         return ball
 
-    def cut(self, position: Any, volume: Any, ball: Any, bins: SearchCells) -> None:
+    def cut(self, position: Any, volume: Any, ball: Any, key: Any, bins: SearchCells) -> None:
         """The new geometry becomes the old one, and that of these particles the new one."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
         run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.there
-        far = self.search if self._rows.largest(ball.reshape(-1), 0.0) > 0.0 else self.radius
-        place = (bins.start, *bins[2:], self.spacing, self.origin, self.extent)
-        run(k.find_near, count, near, far, *place)
+        mark = self.team.empty(position.shape[0], np.int8)
+        run(k.mark_balls, position.shape[0], ball, mark)
+        balls, rows = self._rows.marked(mark)
+        run(k.find_near, count, near, self.search if balls else self.radius, bins.start, *bins[2:], *self._grid[:3])
         run(
-            k.find_distances, self._corner_rows, near, self._corners, self.radius, far, volume, ball, self._profile,
-            position, *bins, self.shape, self.spacing, self.origin, self.extent, self.cells,
+            k.find_distances, self._corner_rows, near, self._corners, self.radius, volume, self._profile, position,
+            *bins, self.shape, *self._grid,
         )  # fmt: skip
+        if balls:
+            position, ball, key = (self._rows.taken(array, rows) for array in (position, ball, key))
+            bins = self._cells.sort(position, key, 2.0 * self._search_cell)[1]
+            run(
+                k.add_balls, self._corner_rows, near, self._corners, self.ball, self.search, ball, position, *bins,
+                self.shape, *self._grid,
+            )  # fmt: skip
         before, after = self.parts
         is_cut = self.team.empty(self._count, np.int8)
         run(
