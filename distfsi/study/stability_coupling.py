@@ -143,6 +143,19 @@ def hit(scheme: str, pressure: float, cfl: float) -> Verdict:
     return judge(scene, lambda s: float(s.fluid.totals(s.coupling.volume)[0][0]))
 
 
+def carried(scheme: str, ratio: float, cfl: float) -> Verdict:
+    """A wave in water takes along a plate two cells thick, so many times as dense as the water on both its sides."""
+    h, ahead = 1.0 / CELLS, PureState(1000.0, 1e5)
+    behind = wave_into(ahead, WATER, 1e6, RIGHTWARD).behind
+    density = 1000.0 * ratio
+    plate = Body(
+        "plate", Box((0.41,), (0.41 + 2 * h,)), 0.5 * h, density, (0.0,), LinearEos(2.64e9), NoStrength(), None
+    )
+    regions = [(ahead, None), (behind, Box((0.0,), (0.35,)))]
+    scene = scene_of(scheme, cfl, WATER, regions, plate, (0.0,), (1.0,), (CELLS,), 2e-4)
+    return judge(scene, lambda s: float(s.fluid.totals(s.coupling.volume)[0][0]))
+
+
 MAPS = (
     Map(
         "density", "Plate in gas, pressed by 10 : 1", "density of the body over that of the gas",
@@ -155,6 +168,10 @@ MAPS = (
     Map(
         "impact", "Shock in water hits a steel plate", "pressure [Pa]",
         (1e6, 1e7, 1e8, 1e9, 1e10), "CFL number", CFL, hit,
+    ),
+    Map(
+        "lightness", "A wave in water takes a plate along", "density of the body over that of the water",
+        (0.1, 0.3, 1.0, 3.0), "CFL number", CFL, carried,
     ),
 )  # fmt: skip
 STUDY = Stability("stability coupling", DIRECTORY, VERDICTS)
