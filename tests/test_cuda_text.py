@@ -23,6 +23,9 @@ ALWAYS |= {"find_neighbours", "push"}
 
 AIR = '{ eos = "ideal_gas", gamma = 1.4 }'
 TNT = '{ eos = "jwl", rho0 = 1630, A = 3.712e11, B = 3.21e9, R1 = 4.15, R2 = 0.95, omega = 0.3 }'
+STEEL = """density = 7830
+eos = { kind = "mie_grueneisen", c0 = 4569, s1 = 1.49, gamma0 = 2.17, a = 0.46 }
+strength = { kind = "perfectly_plastic", yield_stress = "1 GPa", shear_modulus = "80 GPa" }"""
 
 
 def drivers_of(modules) -> set[str]:
@@ -37,7 +40,7 @@ def _name(module) -> str:
 
 
 def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, scheme: str, form: str):
-    """A ball of steel, fast and thick, in a box of gas: cells get covered, deep and fresh."""
+    """A ball of steel, fast and thick, and a thin plate in a box of gas: cells get covered, deep and fresh."""
     D = dimensions
     path.write_text(
         f"""
@@ -60,9 +63,11 @@ form = "{form}"
 shape = {{ kind = "ball", center = {["8 mm"] * D}, radius = "5 mm" }}
 spacing = "0.7 mm"
 velocity = {[3000, 500, 250][:D]}
-density = 7830
-eos = {{ kind = "mie_grueneisen", c0 = 4569, s1 = 1.49, gamma0 = 2.17, a = 0.46 }}
-strength = {{ kind = "perfectly_plastic", yield_stress = "1 GPa", shear_modulus = "80 GPa" }}
+{STEEL}
+[solid.bodies.plate]
+shape = {{ kind = "box", lower = {["1.4 mm", *["2 mm"] * (D - 1)]}, upper = {["2.1 mm", *["14 mm"] * (D - 1)]} }}
+spacing = "0.7 mm"
+{STEEL}
 """
     )
     return path
