@@ -29,17 +29,20 @@ FAILURE = (
     'fracture_energy="35 kJ/m2",scatter={{modulus=10,size="1 mm",seed={seed}}}}}'
 )
 SMOOTHING = "solid.smoothing=1.3"  # so that the bonds that a crack cuts take its energy
+HEADER = ("seed", "broken at [s]", "r/r0 failed", "r/r0 broken", "width [m]", "thickness [m]", "speed [m/s]")
 SMALLEST = 8  # particles of a fragment that is measured
 SHOWN, WINDOW = (10e-6, 20e-6, 30e-6, 40e-6), 0.1  # the times of the pictures [s] and the width that they show [m]
 
 
 @dataclass(frozen=True)
 class Fragments:
-    """A specimen: time [s] and r/r0 when a first piece has parted; its fragments' widths, thicknesses [m] and speeds
-    [m/s] at the end, and the share of the mass that they hold; all else is dust or touches a plane of symmetry."""
+    """A specimen: time [s] when a first piece has parted; r/r0 when a first particle has failed, and at that time;
+    widths, thicknesses [m] and speeds [m/s] of its fragments at the end, and the share of the mass that they hold; all
+    else is dust or touches a plane of symmetry."""
 
     seed: int
     broken_at: float
+    failed: float
     expansion: float
     width: np.ndarray
     thickness: np.ndarray
@@ -60,14 +63,17 @@ def fragments(directory: Path, seed: int) -> Fragments:
     frames = series(directory, "particles")
     inner = np.hypot(*read_particles(frames[0][1])[1]["position"][:, :2].T)
     rows, start = np.flatnonzero(inner < inner.min() * (1.0 + 1e-6)), inner.min()
-    broken_at, expansion = np.nan, np.nan
+    broken_at, failed, expansion = np.nan, np.nan, np.nan
     for time, path in frames:
         p = read_particles(path)[1]
         order = np.argsort(p["id"])
+        now = float(np.hypot(*p["position"][order][rows, :2].T).mean() / start)
+        if np.isnan(failed) and (p["damage"] >= 1.0).any():
+            failed = now
         if np.unique(p["piece"], return_counts=True)[1].max() < len(order):
-            broken_at, expansion = time, float(np.hypot(*p["position"][order][rows, :2].T).mean() / start)
+            broken_at, expansion = time, now
             break
-    return Fragments(seed, broken_at, expansion, *_measured(read_particles(frames[-1][1])[1]))
+    return Fragments(seed, broken_at, failed, expansion, *_measured(read_particles(frames[-1][1])[1]))
 
 
 def _measured(p: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -92,7 +98,7 @@ def _measured(p: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 def line(f: Fragments) -> str:
     """A specimen as a line of the table."""
-    head = f"{f.seed:4} {1e6 * f.broken_at:8.1f} {f.expansion:8.2f} {len(f.width):8}"
+    head = f"{f.seed:4} {1e6 * f.broken_at:8.1f} {f.failed:11.2f} {f.expansion:8.2f} {len(f.width):8}"
     if not len(f.width):
         return f"{head}  only dust"
     means = (1e3 * f.width.mean(), 1e3 * f.thickness.mean(), f.speed.mean(), 100.0 * f.share)
@@ -149,7 +155,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     if communicator.rank > 0:
         return
     found = [fragments(directory, seed) for seed, directory in directories.items()]
-    print("seed  broken [us]  r/r0  fragments  width [mm]  thickness  speed [m/s]  mass [%]")
+    print("seed  broken [us]  r/r0 failed  broken  fragments  width [mm]  thickness  speed [m/s]  mass [%]")
     print("\n".join(line(f) for f in found))
     print(together(found))
     for source in TUBE_FRAGMENTS:
@@ -179,10 +185,11 @@ def write(found: Sequence[Fragments]) -> None:
     """All fragments as CSV."""
     with (DIRECTORY / "fragments.csv").open("w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["seed", "broken at [s]", "r/r0", "width [m]", "thickness [m]", "speed [m/s]"])
+        table.writerow(HEADER)
         for f in found:
+            begin = (f.seed, f"{f.broken_at:.3g}", f"{f.failed:.3f}", f"{f.expansion:.3f}")
             for w, t, v in zip(f.width, f.thickness, f.speed, strict=True):
-                table.writerow([f.seed, f"{f.broken_at:.3g}", f"{f.expansion:.3f}", f"{w:.3e}", f"{t:.3e}", f"{v:.0f}"])
+                table.writerow([*begin, f"{w:.3e}", f"{t:.3e}", f"{v:.0f}"])
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
