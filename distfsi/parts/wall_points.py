@@ -11,7 +11,7 @@ from distfsi.device.seam import Columns
 from distfsi.mesh.rows import Rows
 
 FARTHEST = 1.25  # between points, in units of half a cell or of the particles' spacing, if that is more
-LONGEST = 4  # points along each axis of a particle
+LONGEST = 6  # points along each axis of a particle
 PER_PARTICLE = LONGEST**3
 
 
