@@ -27,8 +27,8 @@ from distfsi.parts.wall_points import WallPoints
 from distfsi.scene.description import Scene
 
 MIRRORS = ("symmetry", "wall", "outflow", "inflow")
-LARGEST_MOVE = 0.45  # of a cell in a step, before the forces between particles change its speed
-FARTHEST_MOVE = 0.5  # of a cell, whatever they do: then the solid makes no other sub-step
+LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
+FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
 PARTICLE_DRIVERS = (
     *EXCHANGE,
     *row_kernels.REDUCTIONS,
@@ -158,7 +158,7 @@ class CutCells:
     # ---- one step ---------------------------------------------------------------------------------------------------
 
     def time_step(self) -> float:
-        """Longest step [s] in which no particle of this rank crosses more than half a cell."""
+        """Longest step [s] in which no particle of this rank goes farther than LARGEST_MOVE."""
         lowest, highest = self._particles.rows.bounds(*self.solid.columns.read("velocity"))
         speed = max(-lowest.min(), highest.max())
         return LARGEST_MOVE * float(self._spacing[: self._dimensions].min()) / max(speed, 1e-300)
