@@ -155,13 +155,15 @@ class Solid:
         self.form.accelerate(c, self._near, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
-        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare()."""
+        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare(). Of
+        particles with the same step the first by block, body and id is named."""
         if self.count == 0:
             return np.inf, "solid"
-        dt, place = self.exchange.rows.least(self._limits.reshape(-1))
+        rows = self.exchange.rows
+        dt, place = rows.least(rows.taken(self._limits, self.team.array(self._order)).reshape(-1))
         particle, cause = divmod(place, len(LIMITS))
-        dt = float(dt)
-        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {self.columns['id'][particle]}"
+        dt, id = float(dt), self.columns["id"][self._order[particle]]
+        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
 
     def advance(self, dt: float) -> None:
         """Collective, after prepare(). Advance by `dt` [s]: velocities first, then positions.

@@ -148,12 +148,7 @@ class WallGeometry:
             *bins, self.shape, *self._grid,
         )  # fmt: skip
         if balls:
-            position, ball, key = (self._rows.taken(array, rows) for array in (position, ball, key))
-            bins = self._cells.sort(position, key, 2.0 * self._search_cell)[1]
-            run(
-                k.add_balls, self._corner_rows, near, self._corners, self.ball, self.search, ball, position, *bins,
-                self.shape, *self._grid,
-            )  # fmt: skip
+            self.add_balls(*(self._rows.taken(array, rows) for array in (position, ball, key)))
         before, after = self.parts
         is_cut = self.team.empty(self._count, np.int8)
         run(
@@ -163,6 +158,14 @@ class WallGeometry:
             run(k.round_parts, self._count, near, after, self.shape)
             run(k.close_stairs, self._count, near, after, self.faces[1], self.shape, self.steps)
         run(k.mark_cut_blocks, count, near, is_cut, prod(self.blocks.shape[:2]))
+
+    def add_balls(self, position: Any, ball: Any, key: Any) -> None:
+        """Distances become those to these particles' balls where they are nearer."""
+        bins = self._cells.sort(position, key, 2.0 * self._search_cell)[1]
+        self.team.run(
+            self.kernels.add_balls, self._corner_rows, self.near.read, self._corners, self.ball, self.search, ball,
+            position, *bins, self.shape, *self._grid,
+        )  # fmt: skip
 
     @property
     def _corners(self) -> Any:

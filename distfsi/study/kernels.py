@@ -135,8 +135,10 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     with np.errstate(all="ignore"):
         step(*simulation.parts, time_step)
         if coupling and scene.coupling.scheme == "cut_cells":
+            D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
             coupling.evict()
+            coupling.wall.add_balls(gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64))
         simulation.watch()
     return gpu
 
