@@ -82,7 +82,10 @@ class Rows:
 
 
 class Groups:
-    """Sums over groups of rows, the same whatever else there is: in each group by runs of CHUNK rows."""
+    """Sums over groups of rows, the same whatever else there is: in each group by runs of CHUNK rows.
+
+    rows  those of all groups, on the device
+    """
 
     def __init__(self, device: Device, kernels: SimpleNamespace, sizes: np.ndarray, rows: np.ndarray | None = None):
         """`sizes` (groups,): how many `rows` each group has, one group after the other; by default all as they lie."""
@@ -92,13 +95,13 @@ class Groups:
         number = np.arange(len(self._group)) - np.repeat(np.cumsum(runs) - runs, runs)
         first = (np.cumsum(sizes) - sizes)[self._group] + CHUNK * number
         self._first = device.array(np.append(first, sizes.sum()))
-        self._rows = device.array(np.arange(sizes.sum()) if rows is None else rows)
+        self.rows = device.array(np.arange(sizes.sum()) if rows is None else rows)
 
     def sums(self, values: Any) -> np.ndarray:
         """Sums (groups, k) of the rows of `values` (n, k); k is 1 for values (n,)."""
         runs, width = len(self._group), values.shape[1] if len(values.shape) > 1 else 1
         sums = self._device.empty((runs, width))
-        self._device.run(self._kernels.add_rows, runs, self._first, self._rows, width, values.reshape(-1), sums)
+        self._device.run(self._kernels.add_rows, runs, self._first, self.rows, width, values.reshape(-1), sums)
         columns = self._device.get(sums).T
         return np.stack([np.bincount(self._group, column, self._count) for column in columns], axis=1)
 
