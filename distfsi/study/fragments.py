@@ -160,10 +160,10 @@ def whole_without_failure() -> tuple[int, float]:
 
 def told(found: Sizes) -> str:
     """A table of sizes."""
-    q, error = found.exponent
-    lines = [
-        f"{found.law.name}, {ROWS * found.finer} particles thick: q = {q:.2f} ± {error:.2f} (theory {found.law.q:.2f})"
-    ]
+    lines = [f"{found.law.name}, {ROWS * found.finer} particles thick"]
+    if len(found.rates) > 1:
+        q, error = found.exponent
+        lines[0] += f": q = {q:.2f} ± {error:.2f} (theory {found.law.q:.2f})"
     for rate, mean, spread, counts in zip(found.rates, found.mean, found.error, found.counts, strict=True):
         lines.append(
             f"  {rate:9.3g} /s  {1e3 * mean:6.2f} ± {1e3 * spread:.2f} mm  theory {1e3 * found.law.size(rate):6.2f} mm"
@@ -193,9 +193,9 @@ def _study(communicator, overrides, rates, seeds, fine_rates) -> None:
         for law, some, finer in ((SCATTER, rates, 1), (SOFTENING, rates, 1), (SOFTENING, fine_rates, 2)):
             if some:
                 found.append(sizes(law, some, seeds, finer))
-                print(told(found[-1]), flush=True)
                 draw(found)
                 write(found)
+                print(told(found[-1]), flush=True)
     print(f"\ntable and chart in {DIRECTORY}", flush=True)
 
 

@@ -102,6 +102,12 @@ SOLIDS = {
     "bonded_copper_block_2d": lambda: copper(128, 2, "total_lagrangian"),
     "bonded_copper_block_3d": lambda: copper(32, 3, "total_lagrangian"),
 }
+SOLID_SIZES = {
+    f"{kind}_block_3d_{name}_particles": lambda side=side, form=form: copper(side, 3, form)
+    for kind, form in (("copper", "updated_lagrangian"), ("bonded_copper", "total_lagrangian"))
+    for name, side in (("4e4", 34), ("2.5e5", 63), ("2e6", 126))
+}
+"""The same solid from small to large; two million particles with bonds take 16 GB."""
 COUPLED = {
     "blast_on_copper_2d": lambda: blast_on_copper(256, 2),
     "blast_on_copper_3d": lambda: blast_on_copper(48, 3),
