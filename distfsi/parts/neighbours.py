@@ -68,16 +68,22 @@ class NeighbourSearch:
         self._cells = search.CellSort(kernels, device, lower, upper)
         self._width = 4 * 6 ** (len(lower) - 1)
         self.table, self.count = device.empty((0, self._width), np.int32), device.empty(0, np.int64)
+        self._found = self.table  # by the last find(); used again, as fresh memory costs more than the search
 
     def find(self, own: int, position: Any, state: Any, key: Any, size: float) -> None:
-        """Find the neighbours, closer than h_i + h_j, of the first `own` particles, with search cells of `size` [m]."""
+        """Find the neighbours, closer than h_i + h_j, of the first `own` particles, with search cells of `size` [m].
+
+        The table lasts until the next call.
+        """
         cell, cells = self._cells.sort(position, key, size)
         across = self._cells.strides[1 : position.shape[1]]  # rows of three cells lie along x
         rows = np.array([np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))], dtype=np.int64)
         near = (position, state, cell, cells.start, cells.order, self._device.array(np.sort(rows)))
         self.count = self._device.empty(own, np.int64)
         while True:
-            self.table = self._device.empty((own, self._width), np.int32)
+            if self._found.shape != (own, self._width):
+                self._found = self._device.empty((own, self._width), np.int32)
+            self.table = self._found
             self._device.run(self._kernels.find_neighbours, own, *near, self.table, self.count)
             most = self._rows.largest(self.count, 0)
             if most <= self._width:
