@@ -6,6 +6,7 @@ import ctypes
 import itertools
 import os
 import sys
+import time
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +20,7 @@ from distfsi.errors import InputError
 
 # What launchers tell their processes about the number of ranks (MPICH and Intel MPI, Open MPI, srun).
 LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+LAST_WORDS = 0.2  # [s] that launchers get to take what a failing rank has written, before they end it
 
 
 class Communicator:
@@ -131,6 +133,9 @@ class Communicator:
 
     def abort(self, code: int) -> None:
         """End all ranks at once; the launcher returns `code` where it can."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        time.sleep(LAST_WORDS)
         self.world.Abort(code)
 
 
@@ -160,8 +165,6 @@ def install_abort_on_exception(communicator: Communicator) -> None:
     def report_and_abort(kind, error, trace) -> None:
         lines = "".join(traceback.format_exception(kind, error, trace))
         print(f"rank {communicator.rank}: {lines}", file=sys.stderr)
-        sys.stdout.flush()
-        sys.stderr.flush()
         communicator.abort(getattr(error, "exit_code", 1))
 
     sys.excepthook = report_and_abort
