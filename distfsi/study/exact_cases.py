@@ -78,7 +78,7 @@ class Blast:
     quick_cells: int
 
 
-BLASTS = {1: Blast(2 * 0.0673185, 0.5, 200, 50), 2: Blast(0.311357, 0.75, 120, 30), 3: Blast(0.851072, 1.0, 90, 12)}
+BLASTS = {1: Blast(2 * 0.0673185, 0.5, 200, 50), 2: Blast(0.311357, 0.75, 120, 30), 3: Blast(0.851072, 1.0, 104, 12)}
 DEPOSIT = 2.5  # radius of the heated ball, in cells
 
 
