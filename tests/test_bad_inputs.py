@@ -61,6 +61,8 @@ BROKEN = [
     (changed(SOD, ("phase", 'phase = "gsa"')), ["did you mean 'gas'?"]),
     (changed(SOD, ("[fluid.phases", "[fluid]\nsharpening = true\n[fluid.phases.gas]")), ["needs an interface"]),
     (changed(SOD, ("density", "density = 0")), ["must be > 0"]),
+    (changed(SOD, ("density", "density = 1\nvolume_fraction = 0.5")), ["volume_fraction (line 24): needs two phases"]),
+    (changed(BUBBLE, ("density", "density = 1\nvolume_fraction = 1e-9")), ["expected 1e-06 to 1 - 1e-06"]),
     (changed(SOD, ("density", 'density = "1 kg"')), ["has units kg, needs kg/m3"]),
     (changed(SOD, ("pressure", "")), ["give either pressure or energy"]),
     (changed(SOD, ("pressure", "pressure = 1\nenergy = 1")), ["not both"]),
