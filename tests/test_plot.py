@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from PIL import Image
 from distfsi.__main__ import main
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
-from distfsi.output import fields
+from distfsi.output import fields, frames
 from distfsi.output.fields import read_cells, read_layer, series
-from distfsi.output.frames import Film
+from distfsi.output.frames import Film, telling_plane
 from distfsi.output.info import describe
 from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
@@ -117,7 +118,7 @@ def test_profiles_of_all_times_on_the_same_axes(line, figures):
 
 def test_maps_of_a_slice_with_particles(space, figures):
     paths = list(plot(space, field="density", particles="speed", slice=(1, 0.35), every=2))
-    assert [path.name for path in paths] == ["density-000000.png", "history.png"]
+    assert [path.name for path in paths] == ["density-speed-y=0.35-000000.png", "history.png"]
     (image,) = figures[0].findobj(AxesImage)[:1]
     _, fields, _, _ = read_cells(series(space, "cells")[0][1])
     assert np.array_equal(image.get_array().filled(np.nan), fields["density"][:, 3], equal_nan=True)
@@ -218,6 +219,23 @@ def test_particles_of_a_slice_lie_near_it(space):
     assert frame.axes == (0, 2)
     assert 0 < len(frame.particles["position"]) < 4 * 8 * 8
     assert np.abs(frame.particles["position"][:, 1] - 0.3).max() <= 0.5 * frame.spacing + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "plane"),
+    [
+        ((0.0, 0.0, 0.6), (0.7, 0.7, 0.65), (1, 0.05)),  # a quarter of a slab
+        ((0.2, 0.2, 0.6), (0.8, 0.8, 0.65), (1, 0.5)),
+        ((0.4, 0.45, 0.0), (0.5, 0.65, 0.9), (1, 0.55)),  # a column on the floor
+        ((0.45, 0.4, 0.0), (0.65, 0.5, 0.9), (0, 0.55)),
+        ((-0.5, -0.5, -0.5), (2.0, 2.0, 2.0), (1, 0.5)),  # beyond the domain
+    ],
+)
+def test_the_plane_that_shows_most_of_the_bodies(monkeypatch, lower, upper, plane):
+    corners = {"position": np.array([lower, upper])}
+    monkeypatch.setattr(frames, "read_grid", lambda path: (np.full(3, 10), np.zeros(3), np.full(3, 0.1)))
+    monkeypatch.setattr(frames, "read_particles", lambda path: (0.0, corners))
+    assert telling_plane(Path("cells"), Path("particles")) == pytest.approx(plane)
 
 
 # ---- info ------------------------------------------------------------------------------------------------------------

@@ -159,11 +159,17 @@ def read_layer(
         return _read_time(root), fields, (low, high)
 
 
+def read_grid(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells, at least one, low corner and edges of a cell [m] along x, y, z of a cells file."""
+    with h5py.File(path) as file:
+        attributes = file["VTKHDF"].attrs
+        return np.maximum(attributes["WholeExtent"][1::2], 1), attributes["Origin"], attributes["Spacing"]
+
+
 def axis_across(path: Path) -> int:
     """The axis across the only layer of a cells file; z if it has several."""
-    with h5py.File(path) as file:
-        cells = np.maximum(file["VTKHDF"].attrs["WholeExtent"][1::2], 1)
-        return 2 if cells[2] == 1 or cells.min() > 1 else int(np.argmin(cells))
+    cells, _, _ = read_grid(path)
+    return 2 if cells[2] == 1 or cells.min() > 1 else int(np.argmin(cells))
 
 
 def field_names(path: Path) -> list[str]:

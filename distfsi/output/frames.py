@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from distfsi.output.fields import axis_across, field_names, read_layer, read_particles, series
+from distfsi.output.fields import axis_across, field_names, read_grid, read_layer, read_particles, series
 
 AXES = "xyz"
 ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of a plane, horizontal and vertical, by its normal
@@ -56,7 +56,8 @@ class Frame:
 class Film:
     """The frames of a run, in the order of their `times` [s], loaded one by one.
 
-    plane: where three dimensions are cut; by default through the middle, seen along z.
+    plane: where three dimensions are cut; by default where `telling_plane` says or, without particles, through the
+    middle, seen along z.
     Raises FileNotFoundError when there are no field files, ValueError when the plane misses the domain.
     """
 
@@ -70,6 +71,8 @@ class Film:
         self._plane = plane
         if not self._cells:
             self._box = self._box_of_particles()
+        elif plane is None and self._particles:
+            self._plane = telling_plane(self._cells[0][1], self._particles[0][1])
 
     def __len__(self) -> int:
         return len(self.times)
@@ -113,6 +116,25 @@ class Film:
         high = np.max([position.max(axis=0) for position in corners], axis=0)
         margin = 0.05 * (high - low).max() * (high > low)
         return low - margin, high + margin
+
+
+def telling_plane(cells: Path, particles: Path) -> Plane | None:
+    """The plane that shows most of the bodies in a pair of files: along their longest and their shortest edge, through
+    their middle or, where they touch only the low end of the domain (of a half or a quarter, as a rule), along that
+    end. None unless there are three dimensions and particles."""
+    count, low, edge = read_grid(cells)
+    position = read_particles(particles)[1]["position"]
+    if count.min() == 1 or len(position) == 0:
+        return None
+    high = low + count * edge
+    first, last = np.clip(position.min(axis=0), low, high), np.clip(position.max(axis=0), low, high)
+    extents = np.round((last - first) / (high - low).max(), 2)
+    normal = sorted((2, 1, 0), key=lambda axis: extents[axis])[1]
+    touches_low, touches_high = first < low + edge, last > high - edge
+    place = np.where(
+        touches_low & ~touches_high, low + 0.5 * edge, np.clip(0.5 * (first + last), low, high - 0.5 * edge)
+    )
+    return normal, float(place[normal])
 
 
 def load_frames(directory: Path, count: int) -> list[Frame]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from distfsi.errors import InputError
-from distfsi.output.frames import Film, Plane
+from distfsi.output.frames import AXES, Film, Plane
 from distfsi.output.history import read_history
 from distfsi.output.maps import Colors, Sheet, cell_colors, draw_maps, particle_colors, values
 from distfsi.output.panels import HISTORY_HEIGHT, WIDTH, draw_history, draw_profiles, profiles_height
@@ -38,8 +38,9 @@ def plot(
 
     field: of the cells (default pressure); particles: field that colors the particles (default plastic strain or, where
     nothing has yielded, speed); time: only the frame nearest to it [s]; every: each so many frames; slice: plane of
-    three dimensions, (axis, place [m]); movie: the frames as an animated GIF, too. Runs along a line are drawn with all
-    their fields. Raises InputError where the directory has no such thing.
+    three dimensions, (axis, place [m]), by default the one that shows most of the bodies; movie: the frames as an
+    animated GIF, too. Runs along a line are drawn with all their fields. Raises InputError where the directory has no
+    such thing.
     """
     folder = directory / FOLDER
     if gauges:
@@ -51,9 +52,10 @@ def plot(
         numbers = [int(np.argmin(np.abs(np.array(film.times) - time)))]
     folder.mkdir(exist_ok=True)
     first = next(film.frames([0]))
+    label = "" if slice is None else f"-{AXES[slice[0]]}={slice[1]:g}"
     draw = _draw_lines if first.dimensions == 1 else _draw_planes
     frames = []
-    for path in draw(film, numbers, folder, field, particles):
+    for path in draw(film, numbers, folder, label, field, particles):
         frames.append(path)
         yield path
     if movie:
@@ -82,7 +84,7 @@ def _save(figure: Figure, path: Path) -> Path:
 # ---- frames ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_lines(film: Film, numbers: Sequence[int], folder: Path, *_) -> Iterator[Path]:
+def _draw_lines(film: Film, numbers: Sequence[int], folder: Path, label: str, *_) -> Iterator[Path]:
     """Profiles of all fields, beside those of the first time, on axes that fit all times."""
     frames = dict(zip(numbers, film.frames(numbers), strict=True))
     first = next(film.frames([0]))
@@ -91,23 +93,24 @@ def _draw_lines(film: Film, numbers: Sequence[int], folder: Path, *_) -> Iterato
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=(MAP_WIDTH, profiles_height(fitted)))
             draw_profiles(figure, [first, frame] if number else [first], fitted)
-            yield _save(figure, folder / f"profiles-{number:06d}.png")
+            yield _save(figure, folder / f"profiles{label}-{number:06d}.png")
 
 
 def _draw_planes(
-    film: Film, numbers: Sequence[int], folder: Path, field: str | None, particles: str | None
+    film: Film, numbers: Sequence[int], folder: Path, label: str, field: str | None, particles: str | None
 ) -> Iterator[Path]:
     """Maps with the same colors at all times."""
     name = _field(film, field)
     fields = [] if name is None else [_cell_colors(film, numbers, name)]
     names = [name] if name else []
+    what = "-".join(filter(None, (name, particles))) or "particles"
     colors = _particle_colors(film, numbers, names, particles)
     for number, frame in zip(numbers, film.frames(numbers, names), strict=True):
         sheet = Sheet(frame.aspect, len(fields), 1, colors is not None, MAP_WIDTH, MAP_HEIGHT)
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=(MAP_WIDTH, sheet.height))
             draw_maps(figure, sheet, [frame], fields, colors)
-            yield _save(figure, folder / f"{name or 'particles'}-{number:06d}.png")
+            yield _save(figure, folder / f"{what}{label}-{number:06d}.png")
 
 
 def _field(film: Film, wanted: str | None) -> str | None:
