@@ -35,6 +35,7 @@ def solid(
     viscosity=(1.0, 2.0),
     form="updated_lagrangian",
     communicator=None,
+    artificial_stress=0.0,
 ):
     """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
     D = len(lower)
@@ -45,7 +46,7 @@ def solid(
         time=d.Time(1.0, 0.5, None),
         gravity=gravity or (0.0,) * D,
         fluid=None,
-        solid=d.Solid(tuple(bodies), 1.3, *viscosity, form=form),
+        solid=d.Solid(tuple(bodies), 1.3, *viscosity, form=form, artificial_stress=artificial_stress),
         output=d.Output("", 0.0, 1),
         performance=d.Performance((block_cells,) * D, (block_cells,) * D),
     )
@@ -91,10 +92,10 @@ def colliding_discs(team, communicator=None):
 
 
 def colliding_balls(team):
-    """Two balls in three dimensions, a quarter of each."""
+    """Two balls in three dimensions, a quarter of each, whose particles resist clumping."""
     left = body(d.Ball((-0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (500.0, 0.0, 0.0))
     right = body(d.Ball((0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (-700.0, 0.0, 0.0))
-    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), team, block_cells=2), 25
+    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), team, 2, artificial_stress=0.3), 25
 
 
 def bonded_discs(team):

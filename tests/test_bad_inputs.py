@@ -96,6 +96,10 @@ BROKEN = [
     (changed(TUBE, ("melt_temperature", 'melt_temperature = "20 degC"')), ["temperatures are given in K"]),
     (changed(TUBE, ("density = \"7830", "density = 0")), ["must be > 0"]),
     (changed(PLATES, ("[solid.bodies.right]", "[solid.bodies.left]")), ["is no TOML"]),
+    (
+        changed(PLATES, ("[solid.bodies.left]", "[solid]\nartificial_stress = 0.3\n[solid.bodies.left]")),
+        ["solid.artificial_stress (line 20): bonds cannot clump; it needs form"],
+    ),
     (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "-10 mm", upper = "1 mm"}')), ["overlaps body 'left'"]),
     (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "1 m", upper = "2 m"}')),
      ["reaches beyond", "no particle"]),

@@ -69,6 +69,7 @@ def test_the_frontier_keeps_what_nothing_beats():
 
 
 def test_stretched_plates_stay_whole_with_bonds_alone():
-    assert stability_solid.stretched("total_lagrangian", 0.6, 1.0) == (stability_solid.SURVIVED, "")
-    verdict, why = stability_solid.stretched("updated_lagrangian", 0.6, 1.0)
+    bonds, updated = (stability_solid.FORMS[name] for name in ("total Lagrangian", "updated Lagrangian"))
+    assert stability_solid.stretched(bonds, 0.6, 1.0) == (stability_solid.SURVIVED, "")
+    verdict, why = stability_solid.stretched(updated, 0.6, 1.0)
     assert (verdict, why.endswith("pieces")) == (stability_solid.BROKEN, True)

@@ -1,11 +1,13 @@
 """The solid as a whole: impact, conservation, symmetry, and the same bits on any number of ranks and threads."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from distfsi.scene.description import Ball, Box, Elastic, HalfSpace, LinearEos, NoStrength
+from distfsi.scene.description import Ball, Box, Elastic, HalfSpace, LinearEos, NoStrength, Tube
+from distfsi.study.stability_solid import pieces
 from launch import run_ranks
 from mpi_solid import COPPER_EOS, SOFT, SOFT_EOS, body, solid, step
 
@@ -34,12 +36,14 @@ def test_copper_plates_reach_the_hugoniot():
     assert np.abs(part.totals()["momentum"]).max() < 1e-12 * 8930.0 * length * 250.0
 
 
-@pytest.mark.parametrize(("dimensions", "spacing", "steps"), [(1, 0.02, 100), (2, 0.04, 60), (3, 0.08, 24)])
-def test_a_free_collision_conserves_mass_momentum_and_energy(dimensions, spacing, steps):
+@pytest.mark.parametrize(
+    ("dimensions", "spacing", "steps", "share"), [(1, 0.02, 100, 0.0), (2, 0.04, 60, 0.0), (3, 0.08, 24, 0.3)]
+)
+def test_a_free_collision_conserves_mass_momentum_and_energy(dimensions, spacing, steps, share):
     here, there = (-0.3, 0.1, 0.1)[:dimensions], (0.3, 0.0, 0.0)[:dimensions]
     left = body(Ball(here, 0.29), spacing, 8930.0, (500.0, 50.0, -80.0)[:dimensions])
     right = body(Ball(there, 0.29), spacing, 2000.0, (-700.0, 0.0, 0.0)[:dimensions], SOFT_EOS, SOFT)
-    part = solid([left, right], (-1.0,) * dimensions, (1.0,) * dimensions)
+    part = solid([left, right], (-1.0,) * dimensions, (1.0,) * dimensions, artificial_stress=share)
     before = part.totals()
     scale = np.abs(part.columns["mass"][:, None] * part.columns["velocity"]).sum()
     for _ in range(steps):
@@ -74,11 +78,12 @@ def test_impulses_clamps_planes_and_gravity_close_the_balances():
     assert energy(part) == pytest.approx(work + part.gravity_work(), rel=1e-12)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3])
 @pytest.mark.parametrize(("dimensions", "spacing", "steps"), [(2, 0.05, 950), (3, 0.1, 150)])
-def test_a_spinning_body_keeps_turning(dimensions, spacing, steps):
+def test_a_spinning_body_keeps_turning(dimensions, spacing, steps, share):
     """Half a turn (2D): angular momentum is kept, and the stress stays that of the centrifugal force."""
     ball = body(Ball((0.0,) * dimensions, 0.5), spacing, 1000.0, (0.0,) * dimensions, LinearEos(3.25e6), Elastic(0.7e6))
-    part = solid([ball], (-1.0,) * dimensions, (1.0,) * dimensions)
+    part = solid([ball], (-1.0,) * dimensions, (1.0,) * dimensions, artificial_stress=share)
     rate, turned = 20.0, 0.0
     x = part.columns["position"]
     part.columns["velocity"][:, :2] = rate * np.stack([-x[:, 1], x[:, 0]], axis=1)
@@ -94,6 +99,61 @@ def test_a_spinning_body_keeps_turning(dimensions, spacing, steps):
     assert angular_momentum() == pytest.approx(before, rel=1e-12)
     assert part.outputs()["von_mises"].max() < 0.5 * 1000.0 * (rate * 0.5) ** 2
     assert np.hypot(*part.columns["position"].T[:2]).max() < 0.52
+
+
+def clumped(dimensions, spacing, steps, share):
+    """How far [spacings] particles go, pushed by 1 cm/s at random, in a lattice with fixed sides that a mean strain of
+    5 % pulls; and by how much its energy grows, over that of this motion."""
+    tension = 0.05
+    box = body(
+        Box((-0.5,) * dimensions, (0.5,) * dimensions), spacing, 1000.0, (0.0,) * dimensions, SOFT_EOS, Elastic(0.7e9)
+    )
+    part = solid([box], (-1.0,) * dimensions, (1.0,) * dimensions, artificial_stress=share)
+    c = part.columns
+    start = c["position"].copy()
+    c["fixed"] = (np.abs(start) > 0.5 - 2.7 * spacing).any(axis=1)
+    c["density"], c["pressure"] = c["density"] * (1.0 - tension), np.full(len(start), -SOFT_EOS.bulk_modulus * tension)
+    pushes = np.random.default_rng(1).standard_normal(start.shape)
+    c["velocity"] = np.where(c["fixed"][:, None], 0.0, 0.01 * pushes)
+    before, kinetic = energy(part), part.totals()["kinetic"]
+    for _ in range(steps):
+        step(part)
+    return np.abs(part.columns["position"] - start).max() / spacing, (energy(part) - before) / kinetic
+
+
+@pytest.mark.parametrize(("dimensions", "spacing", "steps"), [(2, 0.05, 300), (3, 0.1, 250)])
+def test_artificial_stress_keeps_a_stretched_lattice_from_clumping(dimensions, spacing, steps):
+    (free, _), (held, gained) = (clumped(dimensions, spacing, steps, share) for share in (0.0, 0.3))
+    assert held < 1e-3
+    assert free > (100.0 if dimensions == 2 else 8.0) * held
+    assert abs(gained) < 1e-8  # of a motion that is a tiny part of the energy
+
+
+def rubber_rings(share, time):
+    """A quarter of two rubber rings that meet (Gray, Monaghan & Swift 2001), after `time` [m] of sound, and the same
+    energy over that at the start."""
+    E, poisson, density, spacing = 1e7, 0.3975, 1010.0, 0.1
+    K, G = E / 3.0 / (1.0 - 2.0 * poisson), E / 2.0 / (1.0 + poisson)
+    sound = math.sqrt(K / density)
+    ring = body(Tube((4.1, 0.0), 3.0, 4.0), spacing, density, (-0.059 * sound, 0.0), LinearEos(K), Elastic(G))
+    part = solid([replace(ring, packing="lattice")], (0.0, 0.0), (16.0, 16.0), (0, 1), artificial_stress=share)
+    before, now = energy(part), 0.0
+    while now < time / sound:
+        now += step(part)[0]
+    return part, energy(part) / before
+
+
+@pytest.mark.full
+def test_rubber_rings_collide_and_part_whole_with_artificial_stress_alone():
+    def broken(part):
+        return pieces(part.columns["position"], np.ones(2), 0.1) > 1
+
+    assert broken(rubber_rings(0.0, 45.0)[0])
+    part, kept = rubber_rings(0.3, 150.0)
+    assert not broken(part)
+    assert part.totals()["momentum"][0] > 0.0
+    assert part.columns["position"][:, 0].min() > 0.06  # the rings have parted
+    assert kept == pytest.approx(1.0, rel=1e-10)
 
 
 def ringing_disc(lower, symmetric):

@@ -10,19 +10,20 @@ from distfsi.device.markers import ByHand, driver, helper
 from distfsi.kernels.material import matrix_of
 from distfsi.physics.pair import (
     approach_speeds,
-    corrected_stress,
     gradient_correction,
     mid_step,
     pair_acceleration,
     pair_gradient,
     pair_heating,
+    repulsion,
     stable_time,
     viscosity,
+    whole_stress,
 )
 from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import COMPONENTS, DIMENSIONS
-from distfsi.physics.tensors import dot, product, times
+from distfsi.physics.symbols import ARTIFICIAL_STRESS, COMPONENTS, DIMENSIONS
+from distfsi.physics.tensors import components, dot, positive_part, product, rows, times
 
 MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
 
@@ -151,9 +152,23 @@ def pair_geometry(position, state, rates, i, j):
     return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, rough, mean_sound, mean_density))
 
 
+@helper
+def tension_of(stress, i):
+    """The tension that `correct` left beside the particle's corrected stress."""
+    return rows(tuple(stress[i, DIMENSIONS * DIMENSIONS + c] for c in static_range(COMPONENTS)))
+
+
+@helper
+def repelling(state, i, j, dx, tension):
+    """What the artificial stress of a `tension` of particle i, j or both adds to the pair's Pi."""
+    h = 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING])
+    return repulsion(dot(dx, dx), h, state[i, DENSITY] * state[j, DENSITY]) * along(tension, dx)
+
+
 @driver
 def correct(begin, end, position, state, neighbours, neighbour_count, pressure, deviator, correction, stress):
-    """correction[i] = what makes gradients exact for linear fields; stress[i] = the particle's stress times it."""
+    """correction[i] = what makes gradients exact for linear fields; stress[i] = the particle's stress times it and, for
+    artificial stress, behind it the tensile part of the stress."""
     for i in range(begin, end):
         moment = no_matrix()
         for n in range(neighbour_count[i]):
@@ -162,9 +177,13 @@ def correct(begin, end, position, state, neighbours, neighbour_count, pressure, 
             slope = smoothing_slope(dot(dx, dx), 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING]))
             moment = plus(moment, pair_gradient(dx, dx, slope, state[j, MASS] / state[j, DENSITY]))
         matrix = gradient_correction(moment)
-        S = tuple(deviator[i, c] for c in static_range(COMPONENTS))
+        sigma = whole_stress(tuple(deviator[i, c] for c in static_range(COMPONENTS)), pressure[i])
         store_matrix(correction, i, matrix)
-        store_matrix(stress, i, corrected_stress(S, pressure[i], matrix))
+        store_matrix(stress, i, product(sigma, matrix))
+        if ARTIFICIAL_STRESS:
+            tension = components(positive_part(sigma))
+            for c in static_range(COMPONENTS):
+                stress[i, DIMENSIONS * DIMENSIONS + c] = tension[c]
 
 
 @driver
@@ -185,6 +204,8 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, rates, 
             j = neighbours[i, n]
             dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
             densities = state[i, DENSITY] * state[j, DENSITY]
+            if ARTIFICIAL_STRESS:
+                Pi += repelling(state, i, j, dx, plus(tension_of(stress, i), tension_of(stress, j)))
             pull = pair_acceleration(dx, slope, plus(own, matrix_of(stress, j)), densities, Pi)
             total = tuple(total[d] + state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
             fastest = max(fastest, approach)
@@ -214,6 +235,8 @@ def heat(
             before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
             mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
             densities = state[i, DENSITY] * state[j, DENSITY]
+            if ARTIFICIAL_STRESS:
+                Pi += 2.0 * repelling(state, i, j, dx, tension_of(stress, i))  # of viscosity either takes a half
             power += state[j, MASS] * pair_heating(mean, dx, slope, own, densities, Pi)
             total = plus(total, pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY]))
         energy[i] += dt * power

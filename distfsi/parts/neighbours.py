@@ -53,6 +53,12 @@ class Near:
         axes = range(self.position.shape[1])
         return tuple((a, b) for a in axes for b in axes)
 
+    @property
+    def tensor(self) -> Parity:
+        """How the components of a symmetric tensor change in an image."""
+        axes = range(self.position.shape[1])
+        return tuple((a, a) for a in axes) + tuple((a, b) for a in axes for b in axes if a < b)
+
 
 class NeighbourSearch:
     """Finds neighbours with a grid of search cells from the corner `lower` to `upper` [m], the same on all ranks.

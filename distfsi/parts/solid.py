@@ -79,13 +79,17 @@ class Solid:
             "GRAVITY": tuple(map(float, scene.gravity)),
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
+            "SMOOTHING_RATIO": scene.solid.smoothing,
+            "ARTIFICIAL_STRESS": scene.solid.artificial_stress,
             "ZERO_ENERGY": scene.solid.zero_energy,
         } | self.materials.constants
         self.kernels = team.build(DRIVERS, constants)
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, team, self.kernels)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
-        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(self.kernels, team, search, self.dimensions)
+        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(
+            self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
+        )
         if scene.solid.form == "total_lagrangian":
             given = (communicator, scene.solid, *self._tables[:2], self.dimensions)
             self.form = TotalLagrangian(self.kernels, self.exchange, search, *given)

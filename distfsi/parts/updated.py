@@ -21,8 +21,12 @@ class UpdatedLagrangian:
     velocity_gradient  (n, D D) that of the last step [1/s], by rows: a column of the solid
     """
 
-    def __init__(self, kernels: SimpleNamespace, device: Device, search: NeighbourSearch, dimensions: int):
+    def __init__(
+        self, kernels: SimpleNamespace, device: Device, search: NeighbourSearch, dimensions: int, repels: bool = False
+    ):
+        """`repels`: the kernels hold an artificial stress."""
         self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
+        self._repels = repels
 
     def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
         """Add the column."""
@@ -63,9 +67,10 @@ class UpdatedLagrangian:
     def _act(self, near: Near, rates: Any, pressure: Any, deviator: Any, acceleration: Any, limits: Any) -> None:
         D, own, run = self._dimensions, near.own, self._device.run
         self._pairs = (near.position, near.state, self._search.table, self._search.count)
-        self._correction, stress = (self._device.empty((own, D * D)) for _ in range(2))
+        tension = near.tensor if self._repels else ()
+        self._correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
         run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
-        (self._stress,) = near.plan.exchange([(stress, near.matrix)])
+        (self._stress,) = near.plan.exchange([(stress, near.matrix + tension)])
         self._rates = rates
         run(self._kernels.accelerate, own, *self._pairs, rates, self._stress, acceleration, limits)
 

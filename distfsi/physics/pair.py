@@ -7,8 +7,9 @@ correction matrix for its gradients; the same matrix in the forces keeps momentu
 
 from math import sqrt
 
+from distfsi.physics.smoothing import smoothing_kernel
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA
+from distfsi.physics.symbols import ARTIFICIAL_STRESS, DIMENSIONS, SMOOTHING_RATIO, VISCOSITY_ALPHA, VISCOSITY_BETA
 from distfsi.physics.tensors import dot, identity_plus, inverse, least_eigenvalue, product, rows, times
 
 
@@ -51,14 +52,25 @@ def gradient_correction(moment):
     )
 
 
-def corrected_stress(deviator, pressure, correction):
-    """(S - p I) times the gradient correction [Pa], by rows."""
+def whole_stress(deviator, pressure):
+    """S - p I [Pa], by rows."""
     S = rows(deviator)
-    stress = tuple(
+    return tuple(
         tuple(S[a][b] - (pressure if a == b else 0.0) for b in static_range(DIMENSIONS))
         for a in static_range(DIMENSIONS)
     )
-    return product(stress, correction)
+
+
+def repulsion(distance2, h, densities):
+    """What times dx . tension dx is the artificial stress, as a part of Pi, against clumping [m4/kg2].
+
+    eps (W(r)/W(spacing))^4 sigma/rho^2 of the tensile principal stresses sigma (Gray, Monaghan & Swift, Comput. Methods
+    Appl. Mech. Eng. 190, 2001), of which the part along the line of the pair is taken: so angular momentum is kept.
+    """
+    spacing = h / SMOOTHING_RATIO
+    closeness = smoothing_kernel(distance2, h) / smoothing_kernel(spacing * spacing, h)
+    square = closeness * closeness
+    return ARTIFICIAL_STRESS * square * square / (distance2 * densities)
 
 
 def pair_acceleration(dx, slope, stresses, densities, Pi):

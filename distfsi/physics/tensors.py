@@ -3,8 +3,12 @@
 A symmetric tensor is the tuple of its COMPONENTS: (xx), (xx, yy, xy) or (xx, yy, zz, xy, xz, yz).
 """
 
+from math import sqrt
+
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
+
+SWEEPS = 5  # of Jacobi's rotations, until the eigenvalues of a matrix of three rows are exact to round-off
 
 
 def dot(a, b):
@@ -114,3 +118,35 @@ def components(matrix):
         return (matrix[0][0], matrix[1][1], matrix[0][1])
     if DIMENSIONS == 3:
         return (matrix[0][0], matrix[1][1], matrix[2][2], matrix[0][1], matrix[0][2], matrix[1][2])
+
+
+def positive_part(m):
+    """The part of a symmetric matrix with positive eigenvalues: it and its axes by Jacobi's rotations, which need no
+    care where eigenvalues are equal."""
+    axes = identity_plus(0.0, m)
+    for _ in static_range(1 if DIMENSIONS < 3 else SWEEPS):
+        for p in static_range(DIMENSIONS):
+            for q in static_range(p + 1, DIMENSIONS):
+                gap = m[q][q] - m[p][p]
+                twice = (2.0 if gap >= 0.0 else -2.0) * m[p][q]
+                tangent = twice / (abs(gap) + sqrt(gap * gap + twice * twice) + 1e-300)
+                cosine = 1.0 / sqrt(1.0 + tangent * tangent)
+                sine = tangent * cosine
+                turn = tuple(
+                    tuple(
+                        (cosine if a == p or a == q else 1.0)
+                        if a == b
+                        else (sine if a == p and b == q else (-sine if a == q and b == p else 0.0))
+                        for b in static_range(DIMENSIONS)
+                    )
+                    for a in static_range(DIMENSIONS)
+                )
+                m = product(transposed(turn), product(m, turn))
+                axes = product(axes, turn)
+    return tuple(
+        tuple(
+            sum(max(m[c][c], 0.0) * axes[a][c] * axes[b][c] for c in static_range(DIMENSIONS))
+            for b in static_range(DIMENSIONS)
+        )
+        for a in static_range(DIMENSIONS)
+    )

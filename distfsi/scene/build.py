@@ -108,7 +108,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
         for name, body in given.bodies.items()
     )
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
-    form = (given.objective_rate, given.form, given.zero_energy)
+    form = (given.objective_rate, given.form, given.zero_energy, given.artificial_stress)
     return Solid(bodies, given.smoothing, *viscosity, *form)
 
 

@@ -321,7 +321,8 @@ class Body:
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
-    `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli.
+    `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
+    `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
     """
 
     bodies: tuple[Body, ...]
@@ -331,6 +332,7 @@ class Solid:
     objective_rate: ObjectiveRate = "jaumann"
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
+    artificial_stress: float = 0.0
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

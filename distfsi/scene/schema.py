@@ -162,6 +162,11 @@ class SolidInput(Table):
     zero_energy: quantity("1", ge=0.0, le=5.0) = Field(
         4.0 / 3.0, description="stiffness of bonds against zero-energy modes, in shear moduli"
     )
+    artificial_stress: quantity("1", ge=0.0, le=1.0) = Field(
+        0.0,
+        description="of the updated Lagrangian form: share of the tension with which close particles push each other "
+        "away, against clumping; 0.3 is usual, 0 is none",
+    )
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

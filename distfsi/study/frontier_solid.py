@@ -20,6 +20,7 @@ VARIANTS: dict[str, tuple[str, ...]] = {
     "updated Lagrangian": (UPDATED,),
     "updated, alpha 0.5, beta 1": (UPDATED, "solid.viscosity_alpha=0.5", "solid.viscosity_beta=1"),
     "updated, alpha 0, beta 1": (UPDATED, "solid.viscosity_alpha=0", "solid.viscosity_beta=1"),
+    "updated, artificial stress": (UPDATED, "solid.artificial_stress=0.3"),
     "updated, h = 2 spacings": (UPDATED, "solid.smoothing=2", "solid.viscosity_alpha=0", "solid.viscosity_beta=1"),
 }
 SPACINGS = {FLYER: 3, PISTON: 3, VERNEY: 2, TAYLOR: 1, CANTILEVER: 1}  # how many of a problem's, from the coarsest on

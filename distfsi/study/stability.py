@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -33,7 +34,7 @@ class Plane:
 class Map(Plane):
     """Runs over two hardnesses; judge(method, row, column) makes one."""
 
-    judge: Callable[[str, float, float], Verdict]
+    judge: Callable[[Any, float, float], Verdict]
 
 
 def corners(shown: Map) -> Map:
@@ -51,9 +52,9 @@ class Stability:
     verdicts: Mapping[str, str]
 
     def run(
-        self, communicator: Communicator, methods: Mapping[str, str], maps: Sequence[Map], overrides: Sequence[str]
+        self, communicator: Communicator, methods: Mapping[str, Any], maps: Sequence[Map], overrides: Sequence[str]
     ) -> None:
-        """Run all methods, words by name, on the maps; leave a CSV file and a sheet per map."""
+        """Run all methods, by name, on the maps; leave a CSV file and a sheet per map."""
         if communicator.size > 1 or overrides:
             raise InputError([f"study {self.name}: runs on one rank and takes no overrides"])
         self.directory.mkdir(parents=True, exist_ok=True)

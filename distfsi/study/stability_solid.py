@@ -6,8 +6,9 @@ piece: all bonds whole or, where there are none, no particle out of touch with t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -36,7 +37,12 @@ DIRECTORY = Path("out/study_stability_solid")
 COPPER = MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 2.0, 0.47)
 STRONG = JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
 DENSITY, WIDTH = 8930.0, 1e-2
-FORMS = {"total Lagrangian": "total_lagrangian", "updated Lagrangian": "updated_lagrangian"}
+Form = Mapping[str, Any]  # what a description of a solid says of it
+FORMS: dict[str, Form] = {
+    "total Lagrangian": {"form": "total_lagrangian"},
+    "updated Lagrangian": {"form": "updated_lagrangian"},
+    "updated, artificial stress": {"form": "updated_lagrangian", "artificial_stress": 0.3},
+}
 SURVIVED, BROKEN, LEAKED, FAILED = range(4)
 VERDICTS = {
     "survived": "tab:green",
@@ -49,12 +55,12 @@ SHRINKS = 30.0  # times, the stable step until a run has failed
 FACTORS = (0.1, 0.2, 0.33, 0.5, 0.67, 0.83, 1.0)  # of the stable step, over 0.3
 
 
-def scene_of(form: str, bodies: Sequence[Body], size: float) -> Scene:
+def scene_of(form: Form, bodies: Sequence[Body], size: float) -> Scene:
     """Bodies in a box that reaches `size` [m] to all sides."""
     lower, upper = (-size, -size), (size, size)
     return Scene(
         "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None), (0.0, 0.0),
-        None, Solid(tuple(bodies), 1.3, 0.5, 1.0, form=form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
+        None, Solid(tuple(bodies), 1.3, 0.5, 1.0, **form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
     )  # fmt: skip
 
 
@@ -92,7 +98,7 @@ def pieces(position: np.ndarray, stretch: np.ndarray, spacing: float) -> int:
     return connected_components(links, directed=False, return_labels=False)
 
 
-def stretched(form: str, strain: float, through: float) -> tuple[int, str]:
+def stretched(form: Form, strain: float, through: float) -> tuple[int, str]:
     """A plate, so many particles thick, that flies apart evenly to an engineering strain at 1e5/s."""
     spacing, rate = WIDTH / 20.0, 1e5
     half = 0.5 * through * spacing
@@ -123,7 +129,7 @@ def advance_driven(simulation: Simulation, end: float) -> tuple[int, str]:
     return (SURVIVED, "") if drift < 1e-8 else (LEAKED, f"energy {drift:.1e}")
 
 
-def impact(form: str, speed: float, factor: float, through: float = 8.0) -> tuple[int, str]:
+def impact(form: Form, speed: float, factor: float, through: float = 8.0) -> tuple[int, str]:
     """Two plates that meet at a speed [m/s], computed for the time a shock takes through them."""
     spacing = 1.25e-4 * 8.0 / through
     thick, wide = 1e-3, 2e-3
@@ -135,7 +141,7 @@ def impact(form: str, speed: float, factor: float, through: float = 8.0) -> tupl
     return advance(simulation, 2.0 * thick / 4000.0, factor)
 
 
-def thin(form: str, speed: float, through: float) -> tuple[int, str]:
+def thin(form: Form, speed: float, through: float) -> tuple[int, str]:
     """The same of plates that are so many particles thick."""
     return impact(form, speed, 1.0, through)
 
