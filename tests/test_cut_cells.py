@@ -76,6 +76,25 @@ def test_profile_of_the_kernel_is_that_of_half_spaces(dimensions):
     assert np.interp(s, np.linspace(-1.0, 1.0, len(profile)), profile) == pytest.approx(share, abs=2e-3)
 
 
+@pytest.mark.parametrize("dimensions", [1, 2, pytest.param(3, marks=pytest.mark.full)])
+def test_an_image_counts_where_its_body_reaches_the_end_of_the_domain(dimensions):
+    """A gap between a body and a wall is as open as it is wide, and closed when they touch; nothing jumps."""
+    D, n = dimensions, {1: 20, 2: 20, 3: 12}[dimensions]
+    gaps = np.append(np.linspace(0.0, 0.3, 7), [0.4, 0.7, 0.9])  # in cells
+    box = rigid(Box((2.0,) * (D - 1) + (0.0,), (n - 2.0,) * (D - 1) + (5.0,)), 0.5, (0.0,) * D)
+    ends = (OPEN,) * (D - 1) + (("wall", "wall"),)
+    case = coupled([box], [(gas(1.4, 1.0, (0.0,) * D), None)], (0.0,) * D, (float(n),) * D, (n,) * D, ends)
+    place, opened = case.solid.columns["position"].copy(), []
+    for gap in gaps:
+        case.solid.columns["position"] = place + gap * (np.arange(D) == D - 1)
+        case.coupling._cut(*case.solid.columns.read("position", "velocity"))
+        beneath = case.grid_of(case.coupling.wall.fractions[1].here())[0]
+        opened.append(beneath[(0,) * (3 - D) + (0,) + (n // 2,) * (D - 1)])
+    near = gaps < 0.31
+    assert opened[0] == 0.0 and np.abs(np.diff(opened)[near[1:]]).max() < 0.2
+    assert np.array(opened)[~near] == pytest.approx(gaps[~near], abs=0.02)
+
+
 # ---- uniform flow ---------------------------------------------------------------------------------------------------
 
 

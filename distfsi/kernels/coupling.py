@@ -345,8 +345,15 @@ def home_of(x, lower, spacing, grid_cells, block_cells, curve_index):
 
 
 @helper
-def sum_cells(x, b, radius, kick, shape, lower, spacing, origin, extent, seen_cells):
-    """Sum of kernel * kick over the cells around x in the memory of block b."""
+def beyond(index, cells, weight):
+    """1 for a cell of the grid, `weight` for an image beyond its end."""
+    return weight if index < 0 or index >= cells else 1.0
+
+
+@helper
+def sum_cells(x, b, radius, image, kick, shape, lower, spacing, origin, extent, seen_cells, grid_cells):
+    """Sum of kernel * kick over the cells around x in the memory of block b; images along each axis count by `image`
+    (D,)."""
     cells = shape[0] * shape[1] * shape[2]
     first = tuple(max(origin[b, d] - 2, seen_cells[d, 0]) for d in static_range(3))
     end = tuple(min(origin[b, d] + extent[b, d] + 2, seen_cells[d, 1]) for d in static_range(3))
@@ -361,23 +368,40 @@ def sum_cells(x, b, radius, kick, shape, lower, spacing, origin, extent, seen_ce
                     center = center_of(at, shape, lower, spacing, origin)
                     dx = tuple(center[d] - x[d] for d in static_range(DIMENSIONS))
                     if dot(dx, dx) < radius * radius:
-                        weight = immersed_weight(dot(dx, dx), radius)
+                        index, weight = (i, j, k), immersed_weight(dot(dx, dx), radius)
+                        for d in static_range(DIMENSIONS):
+                            weight = weight * beyond(index[d], grid_cells[d], image[d])
                         total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))
     return total
 
 
 @driver
 def push(
-    begin, end, start, position, mass, impulse, home, radius, kick, shape, lower, spacing, origin, extent, seen_cells,
-    grid_cells, block_cells, curve_index, first_block,
+    begin, end, start, position, mass, image, impulse, home, radius, kick, shape, lower, spacing, origin, extent,
+    seen_cells, grid_cells, block_cells, curve_index, first_block,
 ):  # fmt: skip
     """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle; home[p] =
     the local block that it was in at the `start` of the step.
 
-    seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes.
+    seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes; image (n, D): how
+    much these count for a particle, along each axis.
     """
     for p in range(begin, end):
+        part = tuple(image[p, d] for d in static_range(DIMENSIONS))
         home[p] = home_of(three(start, p), lower, spacing, grid_cells, block_cells, curve_index) - first_block
-        total = sum_cells(three(position, p), home[p], radius, kick, shape, lower, spacing, origin, extent, seen_cells)
+        total = sum_cells(
+            three(position, p),
+            home[p],
+            radius,
+            part,
+            kick,
+            shape,
+            lower,
+            spacing,
+            origin,
+            extent,
+            seen_cells,
+            grid_cells,
+        )
         for d in static_range(DIMENSIONS):
             impulse[p, d] = mass[p] * total[d]

@@ -44,10 +44,11 @@ def find_volumes(begin, end, mass, density, volume):
 
 
 @driver
-def keep_inside(begin, end, position, lower, upper, volume):
-    """volume[i] (n, 1) becomes what of it is in the domain."""
+def keep_inside(begin, end, position, size, lower, upper, volume):
+    """volume (n, 2) = what of a volume `size` (n, 1) is in the domain, and all of it."""
     for i in range(begin, end):
-        volume[i, 0] = volume[i, 0] * part_inside(position, i, volume[i, 0], lower, upper)
+        volume[i, 0] = size[i, 0] * part_inside(position, i, size[i, 0], lower, upper)
+        volume[i, 1] = size[i, 0]
 
 
 @driver

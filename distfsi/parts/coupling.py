@@ -192,10 +192,10 @@ class Coupling:
         wall = (self._covered, self._passed, self._velocity, self._inertia)
         self._run(self.fluid_kernels.spread, *wall, self._kick, self._shape)
         self._exchange(self._kick, np.arange(D), 0.0)
-        impulse, home = team.empty((own, D)), team.empty(own, np.int64)
+        impulse, home, image = team.empty((own, D)), team.empty(own, np.int64), team.array(np.ones((own, D)))
         team.run(
-            self.kernels.push, own, self.solid.start, self.solid.start, *self.solid.columns.read("mass"), impulse, home,
-            self.reach, self._kick, self._shape, self._lower, self._widths, self._origin, self._extent,
+            self.kernels.push, own, self.solid.start, self.solid.start, *self.solid.columns.read("mass"), image,
+            impulse, home, self.reach, self._kick, self._shape, self._lower, self._widths, self._origin, self._extent,
             self._seen_cells, *self._homes, self.blocks.first,
         )  # fmt: skip
         self._run(self.kernels.clear, self._covered, D, self._kick.reshape(-1), self._shape)

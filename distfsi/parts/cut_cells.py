@@ -11,7 +11,7 @@ import numpy as np
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
-from distfsi.kernels import cut_forces
+from distfsi.kernels import cut_forces, images
 from distfsi.kernels import rows as row_kernels
 from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_regions
@@ -42,6 +42,8 @@ PARTICLE_DRIVERS = (
     cut_forces.find_pressures,
     cut_forces.find_debts,
     cut_forces.clear,
+    images.weigh_images,
+    images.fade_images,
     immersed_kernels.push,
 )
 FLUID_DRIVERS = (
@@ -230,9 +232,9 @@ class CutCells:
         self._exchange(self._kick, np.arange(D), 0.0)
         given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
         self.team.run(
-            self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, given, home, wall.seen,
-            self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin, wall.extent, self._seen_cells,
-            wall.cells, *self._homes, self.blocks.first,
+            self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, self._image, given, home,
+            wall.seen, self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin, wall.extent,
+            self._seen_cells, wall.cells, *self._homes, self.blocks.first,
         )  # fmt: skip
         self._run(self.kernels.clear, D, self._kick.reshape(-1), wall.shape)
         return given
@@ -289,19 +291,38 @@ class CutCells:
             [(self._own_middle, "position"), (velocity, vector), (self._own_mass, ((),))]
         )
         self._middle_bins = wall.sort(self._middle, self._plan.key.there)
-        point, volume, number = self._points.of(c)
-        team.run(self.kernels.keep_inside, point.shape[0], point, *self._corners, volume)
+        point, size, number = self._points.of(c)
+        inside = team.empty((point.shape[0], 2))
+        team.run(self.kernels.keep_inside, point.shape[0], point, size, *self._corners, inside)
         plan = self._plan if number is c["id"] else self._ghosts(point, number)
-        position, volume = plan.exchange([(point, "position"), (volume, ((),))])
+        position, volume = plan.exchange([(point, "position"), (inside, ((), ()))])
         bins = wall.sort(position, plan.key.there)
+        points = (plan.key.there, volume, position, *bins)
+        self._image, image = self._weigh_images(plan, point, size, points)
+        team.run(self.kernels.fade_images, plan.count, plan.key.there, image, 2, volume.reshape(-1))
+        if number is not c["id"]:
+            size = team.empty((own, 1))
+            team.run(self.kernels.find_volumes, own, *c.read("mass", "density"), size)
+            self._image, image = self._weigh_images(self._plan, *c.read("position"), size, points)
+        team.run(self.kernels.fade_images, self._plan.count, self._plan.key.there, image, 1, self._mass)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((), *vector))])
         (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((), (), *vector))])
         wall.cut(position, volume, ball, plan.key.there, bins)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
         """Collective. Who needs copies of which particles or points."""
-        images = self.wall.search + 0.5 * self._spacing[: self._dimensions].max()
-        return self._particles.ghosts(position, id, self.wall.reach, image_reach=images, mirrors=MIRRORS)
+        return self._particles.ghosts(position, id, self.wall.reach, image_reach=self.wall.images, mirrors=MIRRORS)
+
+    def _weigh_images(self, plan: GhostPlan, place: Any, size: Any, points: tuple[Any, ...]) -> tuple[Any, Any]:
+        """Collective. How much images along each axis count of the particles at a `place` (own, D) [m], of a `size`
+        (own, 1) [m^D], beside the `points` of all bodies: (own, D) and (count, D) of the plan."""
+        own, D, wall = place.shape[0], self._dimensions, self.wall
+        weight = self.team.empty((own, D))
+        self.team.run(
+            self.kernels.weigh_images, own, weight, place, size, *self._corners, *wall.touching, wall.images, *points
+        )
+        (extended,) = plan.exchange([(weight, ((),) * D)])
+        return weight, extended
 
     def _find_company(self) -> None:
         """Which cells join which, and the lists of the band's, the covered and the loose cells."""

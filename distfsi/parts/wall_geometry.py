@@ -22,6 +22,7 @@ SMOOTHING_RADIUS = 1.5  # in cells, of the kernel whose sum gives the distance
 COARSEST = 3.0  # particle spacings that this radius spans at least
 MARGIN = 0.15  # of a cell, on each side: what thin bodies are thicker than must be, as they move in a step
 THIN, THICK = 0.1, 0.45  # of a cell, beyond its diagonal: the thickness up to which a body is thin, and from which not
+REACHES, AWAY, ASIDE = 0.2, 0.6, 0.9  # half cells or spacings: gaps to the domain's ends, width of a column of a body
 PROFILE_POINTS = 1025
 DRIVERS = (
     *search.DRIVERS,
@@ -75,6 +76,8 @@ class WallGeometry:
     apertures  (old, new) fields (local blocks, D, Z, Y, X): the same of each cell's low face along every axis
     near       (local blocks,) which blocks had particles near them or cells that were not whole
     shape, steps, offsets, origin, extent, spacing, cells: of blocks, of ways to neighbours, of the grid
+    images     [m]: how far from an end of the domain particles may be that have images there; touching (3,) [m]: how
+               far from it their body may be for these to count in full, and not at all; how wide its columns are
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
     """
 
@@ -90,6 +93,8 @@ class WallGeometry:
         self.search = max(self.radius, self.ball + 1.05 * h)
         self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.25 * h), 2.25 * h)
         self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
+        self.images = self.search + 0.5 * h
+        self.touching = tuple(part * max(0.5 * h, spacing) for part in (REACHES, AWAY, ASIDE))
         self._allocate(real)
         self._rows = Rows(team, self.kernels)
         self._cells = search.CellSort(self.kernels, team, grid.lower[:D], grid.upper[:D])
