@@ -13,8 +13,9 @@ from distfsi.device.cpu import Team
 from distfsi.device.seam import Columns
 from distfsi.errors import Diverged
 from distfsi.kernels.particles import EXCHANGE
-from distfsi.kernels.regions import copy_regions
+from distfsi.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.particles import ParticleExchange
@@ -82,6 +83,24 @@ def check_ghost_cells(communicator, copy, grid, block_cells, dtype=np.float64):
         exchange.finish()
         np.testing.assert_array_equal(field, expected, err_msg=f"{grid} {block_cells}")
     assert np.array_equal(np.union1d(exchange.ready, exchange.waiting), np.arange(blocks.local_count))
+    check_chosen_ghosts(exchange, fresh, expected, mirror)
+
+
+def check_chosen_ghosts(exchange, fresh, expected, mirror):
+    """Only ghosts of marked cells are filled, of two fields together; those of an inflow, where no mark is, are not."""
+    kernels = Team.build((copy_cells, pack_cells, unpack_cells, *EXCHANGE), {"DIMENSIONS": 1})
+    chosen = ChosenGhosts(exchange, Team(1), kernels)
+    parity = np.where(mirror < 0, 0, 1 << np.maximum(mirror, 0))
+    mark = np.where(np.isfinite(fresh[:, :1]), fresh[:, :1] % 3 == 1, 0).astype(np.int8)
+    exchange.start(mark, np.array([-1]), np.zeros((3, 2, 1)))
+    exchange.finish()
+    for chosen_mark in (mark, np.zeros_like(mark), mark):
+        chosen.choose(chosen_mark.reshape(-1))
+        field, first = fresh.copy(), fresh[:, :1].copy()
+        chosen.exchange((field, parity), (first, parity[:1]))
+        wanted = np.where((chosen_mark > 0) & np.isnan(fresh), expected, fresh)
+        np.testing.assert_array_equal(field, wanted)
+        np.testing.assert_array_equal(first, wanted[:, :1])
 
 
 def random_grid(rng):

@@ -11,6 +11,9 @@ from distfsi.kernels.cut_geometry import step_to
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 
+# What a cell is to the coupling; the ghosts of all but the first must be known to it.
+FAR, BAND, BEHIND, LOOSE = range(4)
+
 NEAR_WHOLE = 0.25  # of a cell: the fluid's stage advances open cells whose swept volume is not farther off
 
 
@@ -42,9 +45,11 @@ def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept,
 
 
 @driver
-def find_band(begin, end, near, plain, whole, kind, swept, fields, offsets, steps, shape, extent, counts):
-    """plain = 1 where all that the fluid's stage reads for a cell is whole; counts (rows, 3) = cells in the band,
-    covered and loose ones."""
+def find_band(begin, end, near, plain, mark, whole, kind, swept, fields, offsets, steps, shape, extent, counts):
+    """mark = what each cell of `near` blocks is; counts (rows, 3) = cells in the band, covered and loose ones.
+
+    plain becomes 1 where all that the fluid's stage reads for a cell is whole.
+    """
     cells = shape[0] * shape[1] * shape[2]
     for r in range(begin, end):
         b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
@@ -61,39 +66,41 @@ def find_band(begin, end, near, plain, whole, kind, swept, fields, offsets, step
         band, covered, loose = 0, 0, 0
         for i in range(n):
             if kind[at + i] == COVERED:
+                mark[at + i] = BEHIND
                 covered += 1
             elif plain[at + i] == 0:
+                mark[at + i] = BAND
                 band += 1
             elif load(swept, share + i) != 1.0:
+                mark[at + i] = LOOSE
                 loose += 1
+            else:
+                mark[at + i] = FAR
         counts[r, 0] = band
         counts[r, 1] = covered
         counts[r, 2] = loose
 
 
 @driver
-def list_band(begin, end, near, plain, kind, swept, fields, shape, extent, first, band, covered, loose):
+def list_band(begin, end, near, mark, shape, extent, first, band, covered, loose):
     """Write the cells of the band, the covered and the loose ones, row by row, from the places first (rows, 3) on."""
-    cells = shape[0] * shape[1] * shape[2]
     for r in range(begin, end):
         b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
-        share = at + b * (fields - 1) * cells
         n, m, l = first[r, 0], first[r, 1], first[r, 2]
         for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
-            if kind[at + i] == COVERED:
+            if mark[at + i] == BEHIND:
                 covered[m] = at + i
                 m += 1
-            elif plain[at + i] == 0:
+            elif mark[at + i] == BAND:
                 band[n] = at + i
                 n += 1
-            elif load(swept, share + i) != 1.0:
+            elif mark[at + i] == LOOSE:
                 loose[l] = at + i
                 l += 1
 
 
 @driver
-def mark_band(begin, end, cells, near, plain, shape, mark):
-    """mark[n] = 1 where cells[n] is in the band or covered, else 0."""
+def mark_band(begin, end, cells, mark, chosen):
+    """chosen[n] = 1 where cells[n] is in the band or covered, else 0."""
     for n in range(begin, end):
-        b = cells[n] // (shape[0] * shape[1] * shape[2])
-        mark[n] = 1 if near[b] > 0 and plain[cells[n]] == 0 else 0
+        chosen[n] = 1 if mark[cells[n]] == BAND or mark[cells[n]] == BEHIND else 0

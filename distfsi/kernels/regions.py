@@ -1,6 +1,9 @@
-"""Copies of box-shaped regions of cells between flat arrays: ghost cells, message buffers, constants."""
+"""Copies between flat arrays: box-shaped regions of cells (ghosts, buffers, constants), and lists of ghost cells.
 
-from distfsi.device.markers import ByHand, driver
+A cell of a list is named by its flat index in a field of one variable; `cells` are those of a block in memory.
+"""
+
+from distfsi.device.markers import ByHand, driver, helper
 
 
 def region_block(constants, arguments):
@@ -35,3 +38,41 @@ def copy_regions(first, last, table, destination, source, mirror):
                     else:
                         for x in range(nx):
                             destination[d + x] = source[s + s_x * x]
+
+
+@helper
+def first_value(at, variables, cells):
+    """Place of a cell's first value in a flat field of so many variables."""
+    return at + at // cells * (variables - 1) * cells
+
+
+@driver
+def copy_cells(begin, end, to, of, flips, parity, cells, field):
+    """The cells `to` of a flat field get the values of the cells `of`, as seen in the mirrors of the bits of `flips`.
+
+    parity (variables,): the axes, as bits, whose reflection changes the sign of each variable.
+    """
+    for n in range(begin, end):
+        ghost, source = first_value(to[n], len(parity), cells), first_value(of[n], len(parity), cells)
+        for v in range(len(parity)):
+            value = field[source + v * cells]
+            field[ghost + v * cells] = value if flips[n] & parity[v] == 0 else -value
+
+
+@driver
+def pack_cells(begin, end, of, flips, parity, cells, field, stride, column, packed):
+    """Row n of `packed`, `stride` values long, gets the values of the cell of[n], from its `column` on, so mirrored."""
+    for n in range(begin, end):
+        source = first_value(of[n], len(parity), cells)
+        for v in range(len(parity)):
+            value = field[source + v * cells]
+            packed[n * stride + column + v] = value if flips[n] & parity[v] == 0 else -value
+
+
+@driver
+def unpack_cells(begin, end, to, variables, cells, packed, stride, column, field):
+    """The cells `to` of a flat field get what pack_cells() has packed."""
+    for n in range(begin, end):
+        ghost = first_value(to[n], variables, cells)
+        for v in range(variables):
+            field[ghost + v * cells] = packed[n * stride + column + v]

@@ -26,6 +26,10 @@ class Messages:
         cells = np.append(0, np.cumsum(self.regions.volume))
         self.cells = cells[np.append(0, ends)]
 
+    def rank_of_cells(self) -> np.ndarray:
+        """The rank (n,) at the other end of each cell."""
+        return np.repeat(self.ranks, np.diff(self.cells))
+
     def buffer(self, variables: int, dtype: np.dtype, device: Device) -> Buffer:
         """A buffer for all messages about a field of so many variables."""
         values = device.message_memory(int(self.cells[-1]) * variables, dtype)
@@ -65,6 +69,7 @@ class Plan:
 class GhostExchange:
     """Fills the ghost cells of fields of `blocks`, edges and corners included; one exchange at a time.
 
+    local, incoming, outgoing: the regions filled from this rank, and the messages from others and to them.
     ready, waiting: local blocks whose ghosts are complete after `start`, and those that need `finish`.
     """
 
@@ -78,10 +83,10 @@ class GhostExchange:
         self._inflow = wanted.select(wanted.constant)
         wanted, given = wanted.select(~wanted.constant), given.select(~given.constant)
         giver, taker = blocks.owners[wanted.source], blocks.owners[given.block]
-        self._local = wanted.select(giver == rank)
-        self._incoming = Messages(wanted.select(giver != rank), giver[giver != rank])
-        self._outgoing = Messages(given.select(taker != rank), taker[taker != rank])
-        self.waiting = np.unique(self._incoming.regions.block) - blocks.first
+        self.local = wanted.select(giver == rank)
+        self.incoming = Messages(wanted.select(giver != rank), giver[giver != rank])
+        self.outgoing = Messages(given.select(taker != rank), taker[taker != rank])
+        self.waiting = np.unique(self.incoming.regions.block) - blocks.first
         self.ready = np.setdiff1d(np.arange(blocks.local_count), self.waiting)
         self._plans: dict[tuple[int, np.dtype], Plan] = {}
 
@@ -130,8 +135,8 @@ class GhostExchange:
         return plan
 
     def _new_plan(self, variables: int, dtype: np.dtype) -> Plan:
-        local, inflow = self._local, self._inflow
-        out, into = self._outgoing.regions, self._incoming.regions
+        local, inflow = self.local, self._inflow
+        out, into = self.outgoing.regions, self.incoming.regions
         in_field = partial(Regions.in_field, blocks=self.blocks, variables=variables)
         tables = {
             "local": local.table(in_field(local, end="block"), in_field(local, end="source")),
@@ -142,6 +147,6 @@ class GhostExchange:
         device = self.device
         return Plan(
             **{name: Table(len(table), device.array(table)) for name, table in tables.items()},
-            outgoing=self._outgoing.buffer(variables, dtype, device),
-            incoming=self._incoming.buffer(variables, dtype, device),
+            outgoing=self.outgoing.buffer(variables, dtype, device),
+            incoming=self.incoming.buffer(variables, dtype, device),
         )

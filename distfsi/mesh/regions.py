@@ -125,7 +125,7 @@ class Regions:
 
     def table(self, destination: np.ndarray, source: np.ndarray, mirrored: bool = True) -> np.ndarray:
         """The table of `kernels.regions.copy_regions` from the places of both ends."""
-        flips = self.run["flip"] @ (1, 2, 4) if mirrored else np.zeros_like(self.block)
+        flips = self.flips if mirrored else np.zeros_like(self.block)
         return np.hstack([self.run["length"], flips[:, None], destination, source])
 
     def in_field(self, blocks: Blocks, variables: int, end: str) -> np.ndarray:
@@ -138,6 +138,21 @@ class Regions:
         block = self.source if is_source else self.block
         first = (block - blocks.first) * variables * cells + start @ strides
         return np.column_stack([first, np.full_like(first, cells), np.broadcast_to(step * strides, start.shape)])
+
+    def cells(self, blocks: Blocks, end: str) -> np.ndarray:
+        """The cells (n,) of the `end` of all regions, by their flat index in this rank's field of one variable."""
+        first, _, *steps = self.in_field(blocks, 1, end).T
+        nx, ny, _ = self.run["length"].T
+        region = np.repeat(np.arange(len(first)), self.volume)
+        nth = np.arange(len(region)) - np.repeat(np.cumsum(self.volume) - self.volume, self.volume)
+        row = nth // nx[region]
+        place = (nth % nx[region], row % ny[region], row // ny[region])
+        return first[region] + sum(n * step[region] for n, step in zip(place, steps, strict=True))
+
+    @property
+    def flips(self) -> np.ndarray:
+        """The axes (n,), as bits, along which each region is mirrored."""
+        return self.run["flip"] @ (1, 2, 4)
 
     def in_message(self, variables: int) -> np.ndarray:
         """Places (n, 5) in a buffer that holds the regions one after the other."""

@@ -14,12 +14,16 @@ from distfsi.mesh.communicator import Communicator
 class Route:
     """Who sends how many rows to whom: found once, then used for any number of transfers."""
 
-    def __init__(self, communicator: Communicator, ranks: np.ndarray) -> None:
-        """Collective. `ranks` (n,) ascending: where each of the rows to come goes; never this rank."""
+    def __init__(self, communicator: Communicator, ranks: np.ndarray, givers: np.ndarray | None = None) -> None:
+        """`ranks` (n,) ascending: where each of the rows to come goes; never this rank. `givers` (m,), too: where each
+        of the rows that arrive comes from; collective without them."""
         self._world = communicator.world
         leaving = np.bincount(ranks, minlength=communicator.size)
-        arriving = np.empty_like(leaving)
-        self._world.Alltoall(leaving, arriving)
+        if givers is None:
+            arriving = np.empty_like(leaving)
+            self._world.Alltoall(leaving, arriving)
+        else:
+            arriving = np.bincount(givers, minlength=communicator.size)
         self._leaving, self._arriving = self._slices(leaving), self._slices(arriving)
         self.leaving, self.arriving = len(ranks), int(arriving.sum())
 

@@ -13,9 +13,11 @@ from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_forces, images
 from distfsi.kernels import rows as row_kernels
+from distfsi.kernels.band import FAR
 from distfsi.kernels.particles import EXCHANGE
-from distfsi.kernels.regions import copy_regions
+from distfsi.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
+from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.particles import GhostPlan, ParticleExchange
 from distfsi.mesh.rows import Groups
@@ -31,6 +33,9 @@ LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, befo
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
 PARTICLE_DRIVERS = (
     *EXCHANGE,
+    copy_cells,
+    pack_cells,
+    unpack_cells,
     *row_kernels.REDUCTIONS,
     cut_forces.keep_mass,
     cut_forces.keep_inside,
@@ -91,6 +96,7 @@ class CutCells:
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
         self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
+        self._near_ghosts = ChosenGhosts(self.exchange, team, self.kernels)
         self._particles = ParticleExchange(blocks, team, self.kernels)
         self._points = WallPoints(self._particles.rows, self.kernels, max(grid.spacing[: grid.dimensions]))
         self._spacing = np.array(grid.spacing)
@@ -107,6 +113,10 @@ class CutCells:
         self._fields = 3 if model.phases == 2 else 1
         self.swept = Pair(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
         fluid.volumes = self.swept
+        self._state_parity, self._swept_parity, self._vector_parity, self._scalar_parity = (
+            team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0)))
+            for axes in (model.mirror, np.full(self._fields, -1), np.arange(grid.dimensions), np.array([-1]))
+        )
         self._master = team.array(blocks.allocate(grid.dimensions, np.int8))
         self._kick, self._debt = (team.array(blocks.allocate(k)) for k in (grid.dimensions, 1))
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
@@ -212,8 +222,7 @@ class CutCells:
         self._mix(U, after)
         lists = [(cells, self._mixed(cells)) for cells in (self._band, self._loose)]
         for _ in range(2):
-            self._exchange_state(U)
-            self._exchange_swept()
+            self._exchange_contents(U)
             for cells, mixed in lists:
                 self.team.run(
                     k.exchange_volumes, cells.shape[0], cells, mixed, U, self._swept, self._kinds, after, *wall.faces,
@@ -221,7 +230,7 @@ class CutCells:
                 )  # fmt: skip
             for cells, mixed in lists:
                 self.team.run(k.put_mixed, cells.shape[0], cells, mixed, U, self._swept, wall.shape)
-        self._exchange_swept()
+        self._near_ghosts.exchange((self.swept.there, self._swept_parity))
 
     def impulse(self) -> Any:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
@@ -229,30 +238,30 @@ class CutCells:
         self._run(
             self.fluid_kernels.spread_impulse, self._cell_volume, self._impulse, self._inertia, self._kick, wall.shape
         )
-        self._exchange(self._kick, np.arange(D), 0.0)
+        self._near_ghosts.exchange((self._kick, self._vector_parity))
         given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
         self.team.run(
             self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, self._image, given, home,
             wall.seen, self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin, wall.extent,
             self._seen_cells, wall.cells, *self._homes, self.blocks.first,
         )  # fmt: skip
-        self._run(self.kernels.clear, D, self._kick.reshape(-1), wall.shape)
+        for cells in (self._band, *self._near_ghosts.cells):
+            self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
         return given
 
     def book_work(self, excess: Any) -> None:
         """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
         wall: the fluid pays for it."""
-        D, P, wall = self._dimensions, self.model.phases, self.wall
+        D, P = self._dimensions, self.model.phases
         (velocity,) = self._plan.exchange([(excess, tuple((a,) for a in range(D)))])
         mean, paid = self.team.empty(self._velocity.shape), self.team.empty(self._band.shape)
         self._see(velocity, mean)
         debt = self._debt.reshape(-1)
         self._run(self.kernels.find_debts, debt, self._impulse, mean)
-        self._exchange(self._debt, np.array([-1]), 0.0)
+        self._near_ghosts.exchange((self._debt, self._scalar_parity))
         self._run(
             self.fluid_kernels.pay_debts, self._joined, paid, debt, self.fluid.there, self._swept, *self._company
         )  # fmt: skip
-        self._run(self.kernels.clear, 1, debt, wall.shape)
         impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self._impulse, self._work, paid))
         self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse
         self._wall_sums[:, -1] += self.solid.work - work[:, 0] - extra[:, 0]
@@ -330,7 +339,7 @@ class CutCells:
         self._exchange(self.kind.there, np.array([-1]), immersed_kernels.FLUID)
         self.wall.find_refuges(self._kinds, self._masters)
         self._exchange(self._master, np.arange(self._dimensions), 0)
-        self._keep_lists(*self.wall.lists(self._kinds, self._swept, self._fields))
+        self._list_cells()
         self._run(self.fluid_kernels.take_contents, self.fluid.there, self._swept, self.wall.shape)
         mark = self.team.empty(self._band.shape[0], np.int8)
         self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
@@ -341,15 +350,14 @@ class CutCells:
     def evict(self) -> None:
         """Collective. Contents of cells that are shut move, and these are covered."""
         U, wall, k = self.fluid.there, self.wall, self.fluid_kernels
-        self._exchange_state(U)
-        self._exchange_swept()
+        self._exchange_contents(U)
         moved = self.team.empty((self._band.shape[0], self.model.variables + 3), U.dtype)
         self._run(
             k.evict, moved, U, self._swept, self._kinds, wall.parts[0], self._masters, wall.steps, wall.shape
         )  # fmt: skip
         self._run(k.put_moved, moved, U, self._swept, wall.shape)
         wall.cover_evicted(self._kinds, self._masters)
-        self._keep_lists(*wall.lists(self._kinds, self._swept, self._fields))
+        self._list_cells()
 
     def _look_around(self) -> None:
         """Which cells around the band's belong together, and which of the band are next to each other."""
@@ -358,6 +366,12 @@ class CutCells:
         self._above = self.team.empty((count, D), np.int64)
         given = (self._masters, wall.offsets, wall.steps, wall.shape, wall.origin, wall.cells)
         self._run(self.fluid_kernels.look_around, self._joined, self._above, *given)
+
+    def _list_cells(self) -> None:
+        """Find the lists, and which ghosts are around the wall."""
+        self._keep_lists(*self.wall.lists(self._kinds, self._swept, self._fields))
+        self._exchange(self.wall.mark, np.array([-1]), FAR)
+        self._near_ghosts.choose(self.wall.mark.reshape(-1))
 
     def _keep_lists(self, lists: list[Any], counts: np.ndarray) -> None:
         self._band, self._covered, self._loose = lists
@@ -377,8 +391,7 @@ class CutCells:
 
     def _mix(self, U: Any, fraction: Any) -> None:
         """Contents of the band become states of what belongs together; covered cells rest."""
-        self._exchange_state(U)
-        self._exchange_swept()
+        self._exchange_contents(U)
         wall, k, mixed = self.wall, self.fluid_kernels, self._mixed(self._band)
         self._run(k.mix, self._joined, mixed, U, self._swept, fraction, *self._company)
         self._run(k.put_mixed, mixed, U, self._swept, wall.shape)
@@ -418,9 +431,9 @@ class CutCells:
         self.exchange.start(field, mirror, np.full((3, 2, field.shape[1]), inflow))
         self.exchange.finish()
 
-    def _exchange_state(self, U: Any) -> None:
-        self.exchange.start(U, self.model.mirror, self.fluid.inflow)
-        self.exchange.finish()
+    def _exchange_contents(self, U: Any) -> None:
+        """Of the cells around the wall."""
+        self._near_ghosts.exchange((U, self._state_parity), (self.swept.there, self._swept_parity))
 
     def _exchange_swept(self) -> None:
         self._exchange(self.swept.there, np.full(self._fields, -1), 1.0)

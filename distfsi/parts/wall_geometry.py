@@ -75,6 +75,7 @@ class WallGeometry:
     fractions  (old, new) fields (local blocks, 1, Z, Y, X): the part of each cell that is open, ghosts included
     apertures  (old, new) fields (local blocks, D, Z, Y, X): the same of each cell's low face along every axis
     near       (local blocks,) which blocks had particles near them or cells that were not whole
+    mark       field (local blocks, 1, Z, Y, X): what cells are to the coupling (kernels/band.py), no ghosts included
     shape, steps, offsets, origin, extent, spacing, cells: of blocks, of ways to neighbours, of the grid
     images     [m]: how far from an end of the domain particles may be that have images there; touching (3,) [m]: how
                far from it their body may be for these to count in full, and not at all; how wide its columns are
@@ -115,6 +116,7 @@ class WallGeometry:
         self.fractions = tuple(Pair(team, np.ones((count, 1, *blocks.shape), real)) for _ in range(2))
         self.apertures = tuple(Pair(team, np.ones((count, D, *blocks.shape), real)) for _ in range(2))
         self.near = Pair(team, np.ones(count, dtype=np.uint8))
+        self.mark = team.array(blocks.allocate(1, np.int8))
         self._whole, self._plain = (team.array(blocks.allocate(1, np.uint8)).reshape(-1) for _ in range(2))
         corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
         self._distance = Pair(team, np.full((count, *corners), self.radius))
@@ -222,20 +224,20 @@ class WallGeometry:
 
     def band_rows(self, cells: Any) -> Any:
         """The rows of those of the `cells` (n,), numbered as they lie in memory, that are in the band or covered."""
-        mark = self.team.empty(cells.shape[0], np.int8)
-        self.team.run(self.kernels.mark_band, cells.shape[0], cells, self.near.read, self._plain, self.shape, mark)
-        return self._rows.marked(mark)[1]
+        chosen = self.team.empty(cells.shape[0], np.int8)
+        self.team.run(self.kernels.mark_band, cells.shape[0], cells, self.mark.reshape(-1), chosen)
+        return self._rows.marked(chosen)[1]
 
     def lists(self, kind: Any, swept: Any, fields: int) -> tuple[list[Any], np.ndarray]:
         """The cells of the band around the wall, the covered and the loose ones (kernels/band.py), and how many of them
         there are in each block (local blocks, 3); a block without them is not near."""
         near, k, run, rows = self.near, self.kernels, self.team.run, self._count
-        whole, plain, share = self._whole, self._plain, (swept, fields)
+        whole, mark, share = self._whole, self.mark.reshape(-1), (swept, fields)
         run(k.find_whole, rows, near.read, whole, kind, *self.parts, *share, self.shape)
         found = self.team.empty((rows, 3), np.int64)
         run(
-            k.find_band, rows, near.read, plain, whole, kind, *share, self.offsets, self.steps, self.shape, self.extent,
-            found,
+            k.find_band, rows, near.read, self._plain, mark, whole, kind, *share, self.offsets, self.steps, self.shape,
+            self.extent, found,
         )  # fmt: skip
         counts = self.team.get(found)
         in_blocks = counts.reshape(self.blocks.local_count, prod(self.blocks.shape[:2]), 3).sum(axis=1)
@@ -243,5 +245,5 @@ class WallGeometry:
         near.changed()
         first = self.team.array(np.cumsum(counts, axis=0) - counts)
         lists = [self.team.empty(n, np.int64) for n in in_blocks.sum(axis=0)]
-        run(k.list_band, rows, near.read, plain, kind, *share, self.shape, self.extent, first, *lists)
+        run(k.list_band, rows, near.read, mark, self.shape, self.extent, first, *lists)
         return lists, in_blocks
