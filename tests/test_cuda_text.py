@@ -2,7 +2,7 @@
 
 import pytest
 
-from distfsi.kernels import bonds, contact, coupling, cut_cells, cut_forces, cut_geometry, solid
+from distfsi.kernels import bonds, contact, coupling, cut_cells, cut_fluxes, cut_forces, cut_geometry, solid
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
@@ -14,7 +14,7 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 FAILING = ("crack", "cut", "look_around", "mark_damaged")
 NOT_REACHED = (*FAILING, "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
 FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
-SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_forces, cut_geometry)}
+SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_fluxes, cut_forces, cut_geometry)}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
 OF_OTHER_SCHEMES["stairs"] = {"evict", "put_moved", "cover_evicted"}  # no cell is small before it is shut

@@ -85,6 +85,7 @@ class Team:
     build = staticmethod(build)
 
     CHUNKS_PER_THREAD = 4
+    lanes = 16
 
     def __init__(self, threads: int):
         self.threads, self.seconds = max(1, threads), 0.0

@@ -60,6 +60,8 @@ class Runtime(Protocol):
 class Gpu:
     """One GPU, used by one rank. `direct`: messages lie in its memory, not in pinned memory of the host."""
 
+    lanes = 1
+
     def __init__(self, runtime: Runtime, direct: bool = False):
         self.runtime, self.direct, self.seconds = runtime, direct, 0.0
         self._queue = Queue.MAIN

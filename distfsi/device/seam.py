@@ -19,9 +19,11 @@ from distfsi.device.fold import Bound
 
 
 class Device(Protocol):
-    """`seconds`: how long its kernels have kept this rank busy."""
+    """`seconds`: how long its kernels have kept this rank busy; `lanes`: how many items of a list a thread does best
+    side by side."""
 
     seconds: float
+    lanes: int
 
     def with_own_clock(self) -> Device:
         """The same device, whose seconds are counted apart."""

@@ -1,4 +1,4 @@
-"""Loops over the band of cells around the wall: contents and their mixing, fluxes through open faces and the wall's.
+"""Loops over the band of cells around the wall: contents, their mixing, and the exchange of volumes.
 
 Between a stage and the mixing after it the band's cells hold contents v U, otherwise states U; a cell outside the band
 is whole, so that both are the same. `swept` (blocks, SWEPT, Z, Y, X) holds v and, for two phases, the contents of both
@@ -6,13 +6,11 @@ phase energies. Cells are named as in kernels/coupling.py.
 """
 
 from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.kernels.coupling import BOX, FLUID, flux_of_face, look_at_face
+from distfsi.kernels.coupling import FLUID
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening, step_to
-from distfsi.kernels.fluid import place
-from distfsi.physics.moving_wall import normal_of, stage_content, state_of, wall_pressure, with_energies
+from distfsi.physics.moving_wall import state_of, with_energies
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, primitives
-from distfsi.physics.tensors import dot
+from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
 SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
@@ -205,135 +203,6 @@ def put_rest(begin, end, covered, U, swept, rest, shape):
         for v in static_range(VARIABLES):
             store(U, first + v * cells, rest[v])
         store(swept, share_at(covered[n], cells), 0.0)
-
-
-# ---- fluxes ---------------------------------------------------------------------------------------------------------
-
-
-@helper
-def open_between(kind, old, new, at, axis, step, cells):
-    """Open part of the face between a cell and the one a `step` below along the axis; no fluid enters covered cells."""
-    both = kind[at] == FLUID and kind[at - step] == FLUID
-    return opening(old, new, at, axis, cells) if both else 0.0
-
-
-@helper
-def see_wall(kind, old, new, at, cells, step, axis, T):
-    """Set rises T around the face between a cell and the next along `axis` to 0 where one of the cells that make them
-    is covered or behind a closed face; returns the open part of the face."""
-    between = open_between(kind, old, new, at + step, axis, step, cells)
-    for c in range(2):
-        beyond = open_between(kind, old, new, at + 2 * c * step, axis, step, cells)
-        if not (between > 0.0 and beyond > 0.0):
-            for v in range(VARIABLES):
-                T[2 * v + c] = 0.0
-    return between
-
-
-@driver
-def find_walls(begin, end, band, area, kind, old, new, shape, steps, spacing):
-    """area (n, D) [1/m] = the wall's area per volume of the cell, along its normal into the solid; it closes what the
-    open faces leave open."""
-    cells = shape[0] * shape[1] * shape[2]
-    for n in range(begin, end):
-        for axis in range(DIMENSIONS):
-            step = steps[axis]
-            low = open_between(kind, old, new, band[n], axis, step, cells)
-            high = open_between(kind, old, new, band[n] + step, axis, step, cells)
-            area[n, axis] = (low - high) / spacing[axis]
-
-
-@driver
-def find_fluxes(begin, end, band, above, flux, U, kind, old, new, shape, steps, rates):
-    """flux (n, 2 D FLUXES) = what passes the low face of a cell along each axis, and its high face unless the cell
-    `above` (n, D) it is in the band too; of faces that are open."""
-    cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
-    for n in range(begin, end):
-        for axis in range(DIMENSIONS):
-            step = steps[axis]
-            for side in range(2 if above[n, axis] < 0 else 1):
-                here = band[n] + (side - 1) * step
-                if open_between(kind, old, new, here + step, axis, step, cells) > 0.0:
-                    look_at_face(U, here, cells, steps, axis, P, T)
-                    see_wall(kind, old, new, here, cells, step, axis, T)
-                    flux_of_face(P, T, F, rates, axis)
-                    for v in range(FLUXES):
-                        flux[n, (2 * axis + side) * FLUXES + v] = load(F, 2 * place(v, axis))
-
-
-@driver
-def advance_band(
-    begin, end, band, above, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new,
-    shape, steps, rates, b, dt, weight,
-):  # fmt: skip
-    """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents.
-
-    start_volume (n,): of the fluid before the step. area, velocity (n, D): of the wall; impulse (n, D) [N s/m3] and
-    work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
-    """
-    cells = shape[0] * shape[1] * shape[2]
-    D = workspace(FLUXES)
-    for n in range(begin, end):
-        at = band[n]
-        for v in range(FLUXES):
-            D[v] = 0.0
-        for axis in range(DIMENSIONS):
-            step = steps[axis]
-            for side in range(2):
-                between = open_between(kind, old, new, at + side * step, axis, step, cells)
-                if between > 0.0:
-                    rate = (2 * side - 1) * rates[axis] * between
-                    shared = side == 1 and above[n, axis] >= 0
-                    m, first = (above[n, axis] if shared else n), (2 * axis + (0 if shared else side)) * FLUXES
-                    for v in range(FLUXES):
-                        D[v] += rate * flux[m, first + v]
-        now = state_at(U, at, cells)
-        surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
-        wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
-        size, normal = normal_of(surface)
-        freed = dt * dot(surface, wall)
-        if size > 0.0:
-            W = primitives(now)
-            relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
-            p = wall_pressure(now, W, dot(relative, normal))
-            for d in static_range(DIMENSIONS):
-                D[PHASES + d] += dt * p * surface[d]
-                impulse[n, d] += weight * p * surface[d]
-            D[PHASES + DIMENSIONS] += freed * p
-            work[n] += weight * p * dot(surface, wall)
-        share = share_at(at, cells)
-        volume, start = load(swept, share), start_volume[n]
-        divergence = tuple(D[v] for v in static_range(FLUXES))
-        content = stage_content(state_at(U_n, at, cells), now, start, volume, divergence, freed, b, dt)
-        put_content(U_new, swept, at, cells, content)
-        store(swept, share, start + b * (volume + freed - start))
-
-
-@driver
-def book_sides(
-    begin, end, chosen, side_cells, side, passed, U, kind, old, new, shape, steps, rates, weights
-):  # fmt: skip
-    """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
-    1 high), beyond what leaves there, for the cells `chosen`. rates (D,): dt/h per axis; weights (D,): share of the
-    stage * dt * area of a face.
-    """
-    cells = shape[0] * shape[1] * shape[2]
-    P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
-    for m in range(begin, end):
-        n = chosen[m]
-        axis, high = side[n] // 2, side[n] % 2
-        step = steps[axis]
-        before = side_cells[n] if high == 1 else side_cells[n] - step
-        weight = (2 * high - 1) * weights[axis]
-        for seen in range(2):  # first as the stage does, which sees no wall
-            look_at_face(U, before, cells, steps, axis, P, T)
-            if seen == 1:
-                weight = -weight * see_wall(kind, old, new, before, cells, step, axis, T)
-            if weight != 0.0:
-                flux_of_face(P, T, F, rates, axis)
-                for v in range(PHASES + DIMENSIONS + 1):
-                    passed[n, v] += weight * load(F, 2 * place(v, axis))
 
 
 # ---- volumes --------------------------------------------------------------------------------------------------------

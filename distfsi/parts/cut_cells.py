@@ -11,7 +11,7 @@ import numpy as np
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
-from distfsi.kernels import cut_forces, images
+from distfsi.kernels import cut_fluxes, cut_forces, images
 from distfsi.kernels import rows as row_kernels
 from distfsi.kernels.band import FAR
 from distfsi.kernels.particles import EXCHANGE
@@ -60,11 +60,12 @@ FLUID_DRIVERS = (
     kernels.mix,
     kernels.put_mixed,
     kernels.put_rest,
-    kernels.find_walls,
-    kernels.find_fluxes,
-    kernels.advance_band,
+    cut_fluxes.find_walls,
+    cut_fluxes.find_faces,
+    cut_fluxes.find_fluxes,
+    cut_fluxes.advance_band,
     kernels.exchange_volumes,
-    kernels.book_sides,
+    cut_fluxes.book_sides,
     kernels.keep_volumes,
     cut_forces.spread_impulse,
     cut_forces.pay_debts,
@@ -94,7 +95,9 @@ class CutCells:
             blocks, team, max(body.spacing for body in scene.solid.bodies), real, scene.coupling.scheme == "stairs"
         )
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
-        self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
+        self.fluid_kernels = team.build(
+            FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
+        )
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
         self._near_ghosts = ChosenGhosts(self.exchange, team, self.kernels)
         self._particles = ParticleExchange(blocks, team, self.kernels)
@@ -185,6 +188,10 @@ class CutCells:
         self._inertia, self._start_volume = (team.empty(n) for _ in range(2))
         self._impulse, self._work = team.zeros((n, D)), team.zeros(n)
         self._run(self.fluid_kernels.find_walls, self._area, *self._walls, self.wall.spacing)
+        self._seen = team.empty(2 * D * n, np.int8)
+        self._run(self.fluid_kernels.find_faces, self._above, self._seen, *self._walls)
+        self._faces = self._particles.rows.marked(self._seen)[1]
+        self._flux = team.empty((n, 2 * D * self.model.constants["FLUXES"]))
         self._see(self._particle_velocity, self._velocity)
         self._near_sides = self.wall.band_rows(self._sides[0])
 
@@ -201,13 +208,13 @@ class CutCells:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
         rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
         rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
-        flux = self.team.empty((self._band.shape[0], 2 * self._dimensions * self.model.constants["FLUXES"]))
-        seen = (self._above, flux)
-        self._run(self.fluid_kernels.find_fluxes, *seen, self._input, *self._walls, rates)
+        boxes = -(-self._faces.shape[0] // self.team.lanes)
+        given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
+        self.team.run(self.fluid_kernels.find_fluxes, boxes, *given)
         self._run(
-            self.fluid_kernels.advance_band, *seen, self._start, self._input, self._output, self._swept,
-            self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates, stage.b, dt,
-            weight,
+            self.fluid_kernels.advance_band, self._above, self._flux, self._start, self._input, self._output,
+            self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
+            stage.b, dt, weight,
         )  # fmt: skip
         self.team.run(
             self.fluid_kernels.book_sides, self._near_sides.shape[0], self._near_sides, *self._sides,

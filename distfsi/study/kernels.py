@@ -22,6 +22,7 @@ from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
 from distfsi.kernels.fluid import advance_tiles
+from distfsi.kernels.regions import pack_cells, unpack_cells
 from distfsi.kernels.rows import pack_rows
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
@@ -149,9 +150,12 @@ def calls_of_debris(communicator: Communicator) -> Calls:
     simulation = Simulation.of(works.bursting_ball(), communicator, device=team)
     for _ in range(STEPS_OF_DEBRIS):
         simulation.step()
-    pack = Kernel(pack_rows, {}, {}, "float64")
-    arguments = (np.zeros(1, np.int64), 1, np.zeros(1), 1, 1, np.zeros(1))
-    return team.calls | {key_of(pack, arguments): (pack, arguments)}
+    rows, reals = np.zeros(1, np.int64), [np.zeros(1, real) for real in REALS]
+    packed = [(pack_rows, (rows, 1, reals[0], 1, 1, reals[0]))]
+    packed += [(pack_cells, (rows, rows, rows, 1, values, 1, 1, values)) for values in reals]
+    packed += [(unpack_cells, (rows, 1, 1, values, 1, 1, values)) for values in reals]
+    kernels = [(Kernel(driver, {}, {}, "float64"), arguments) for driver, arguments in packed]
+    return team.calls | {key_of(*call): call for call in kernels}
 
 
 @dataclass
