@@ -351,9 +351,11 @@ def beyond(index, cells, weight):
 
 
 @helper
-def sum_cells(x, b, radius, image, kick, shape, lower, spacing, origin, extent, seen_cells, grid_cells):
-    """Sum of kernel * kick over the cells around x in the memory of block b; images along each axis count by `image`
-    (D,)."""
+def sum_cells(
+    x, b, radius, image, kind, giver, kick, shape, lower, spacing, origin, extent, seen_cells, grid_cells
+):  # fmt: skip
+    """Sum of kernel * kick over the cells around x, of the kind `giver`, in the memory of block b; images along each
+    axis count by `image` (D,)."""
     cells = shape[0] * shape[1] * shape[2]
     first = tuple(max(origin[b, d] - 2, seen_cells[d, 0]) for d in static_range(3))
     end = tuple(min(origin[b, d] + extent[b, d] + 2, seen_cells[d, 1]) for d in static_range(3))
@@ -363,6 +365,8 @@ def sum_cells(x, b, radius, image, kick, shape, lower, spacing, origin, extent, 
         for j in range(iy[0], iy[1]):
             for i in range(ix[0], ix[1]):
                 at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
+                if kind[at] != giver:
+                    continue
                 given = tuple(load(kick, at + (b * (DIMENSIONS - 1) + d) * cells) for d in static_range(DIMENSIONS))
                 if dot(given, given) > 0.0:
                     center = center_of(at, shape, lower, spacing, origin)
@@ -377,11 +381,11 @@ def sum_cells(x, b, radius, image, kick, shape, lower, spacing, origin, extent, 
 
 @driver
 def push(
-    begin, end, start, position, mass, image, impulse, home, radius, kick, shape, lower, spacing, origin, extent,
-    seen_cells, grid_cells, block_cells, curve_index, first_block,
+    begin, end, start, position, mass, image, impulse, home, radius, kind, giver, kick, shape, lower, spacing, origin,
+    extent, seen_cells, grid_cells, block_cells, curve_index, first_block,
 ):  # fmt: skip
-    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle; home[p] =
-    the local block that it was in at the `start` of the step.
+    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle, none but
+    those of the kind `giver` having any; home[p] = the local block that it was in at the `start` of the step.
 
     seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes; image (n, D): how
     much these count for a particle, along each axis.
@@ -390,18 +394,8 @@ def push(
         part = tuple(image[p, d] for d in static_range(DIMENSIONS))
         home[p] = home_of(three(start, p), lower, spacing, grid_cells, block_cells, curve_index) - first_block
         total = sum_cells(
-            three(position, p),
-            home[p],
-            radius,
-            part,
-            kick,
-            shape,
-            lower,
-            spacing,
-            origin,
-            extent,
-            seen_cells,
-            grid_cells,
-        )
+            three(position, p), home[p], radius, part, kind, giver, kick, shape, lower, spacing, origin, extent,
+            seen_cells, grid_cells,
+        )  # fmt: skip
         for d in static_range(DIMENSIONS):
             impulse[p, d] = mass[p] * total[d]

@@ -11,7 +11,7 @@ are seen in the mirror of its sides.
 
 from math import sqrt
 
-from distfsi.device.markers import driver, helper, load, workspace
+from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
 from distfsi.kernels.gather import any_particle, bins_around, sum_particles
@@ -23,6 +23,7 @@ from distfsi.physics.tensors import dot
 
 NEARBY = 1.2  # kernel radii from where a body is thick to the particles of its corners
 INSIDE, EDGE = 0.04, 0.09  # of a kernel's radius, to the mean of what is around: far from an edge, and at one
+STRETCH = 8  # corners of a row that are left out together where no particle is near
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
 
 SHUT = DEEP  # a cell whose faces are closed, with fluid in it
@@ -57,6 +58,33 @@ def fill_kernel(begin, end, filled, radius, volume, position, start, order, lowe
             filled[p, 1 + d] = moment[d] / max(share, 1e-300)
 
 
+@helper
+def lean_around(lean, p, thick, filled, radius, volume, position, start, order, lower, size, low, window, strides):
+    """The largest share that is filled of the kernels near a particle, and the sum of their weights; lean (D,) = the
+    sum of the ways to what fills them, by weight. Where a share is `thick` no more than that is told."""
+    most, total, around = filled[p, 0], 0.0, NEARBY * radius
+    for d in range(DIMENSIONS):
+        lean[d] = 0.0
+    x = tuple(position[p, d] for d in static_range(DIMENSIONS))
+    bx, by, bz = bins_around(x, tuple(around for _ in static_range(DIMENSIONS)), lower, size, low, window)
+    for k in range(bz[0], bz[1]):
+        for j in range(by[0], by[1]):
+            row = k * strides[2] + j * strides[1]
+            for n in range(start[row + bx[0]], start[row + bx[1]]):
+                q = order[n]
+                dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
+                distance2 = dot(dx, dx)
+                if distance2 < around * around:
+                    most = max(most, filled[q, 0])
+                    if most >= thick:
+                        return (most, total)
+                    part = volume[q, 0] * broad_weight(distance2, radius)
+                    total += part
+                    for d in range(DIMENSIONS):
+                        lean[d] += part * filled[q, 1 + d]
+    return (most, total)
+
+
 @driver
 def thicken(
     begin, end, ball, filled, radius, largest, thin, thick, volume, position, start, order, lower, size, low, window,
@@ -70,28 +98,13 @@ def thicken(
     """
     lean = workspace(DIMENSIONS)
     for p in range(begin, end):
-        most, total, around = filled[p, 0], 0.0, NEARBY * radius
         for d in range(2 + DIMENSIONS):
             ball[p, d] = 0.0
-        if most >= thick or volume[p, 0] <= 0.0:
+        if filled[p, 0] >= thick or volume[p, 0] <= 0.0:
             continue
-        for d in range(DIMENSIONS):
-            lean[d] = 0.0
-        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        bx, by, bz = bins_around(x, tuple(around for _ in static_range(DIMENSIONS)), lower, size, low, window)
-        for k in range(bz[0], bz[1]):
-            for j in range(by[0], by[1]):
-                row = k * strides[2] + j * strides[1]
-                for n in range(start[row + bx[0]], start[row + bx[1]]):
-                    q = order[n]
-                    dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
-                    distance2 = dot(dx, dx)
-                    if distance2 < around * around:
-                        most = max(most, filled[q, 0])
-                        part = volume[q, 0] * broad_weight(distance2, radius)
-                        total += part
-                        for d in static_range(DIMENSIONS):
-                            lean[d] += part * filled[q, 1 + d]
+        most, total = lean_around(
+            lean, p, thick, filled, radius, volume, position, start, order, lower, size, low, window, strides
+        )
         own = largest * min(max((thick - most) / (thick - thin), 0.0), 1.0)
         if own <= 0.0:
             continue
@@ -210,6 +223,20 @@ def corners_of_row(near, b, j, k, extent):
     return 0 if far else extent[b, 0] + 5
 
 
+@helper
+def any_near(b, first, last, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells):
+    """Whether there may be particles within `reach` of the corners first … last of a row."""
+    x = corner_place(b, first - 2, j, k, lower, spacing, origin, cells)
+    least, most = x[0], x[0]
+    for n in range(first + 1, last):
+        place = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
+        least, most = min(least, place[0]), max(most, place[0])
+    half, wide = 0.5 * (most - least), 1.001 * reach
+    around = tuple(wide + half if d == 0 else wide for d in static_range(DIMENSIONS))
+    middle = tuple(least + half if d == 0 else x[d] for d in static_range(DIMENSIONS))
+    return any_particle(middle, around, start, lower, size, low, window, strides)
+
+
 @driver
 def find_distances(
     begin, end, near, distance, radius, volume, profile, position, start, order, lower, size, low, window, strides,
@@ -220,11 +247,22 @@ def find_distances(
     sums = workspace(1)
     for r in range(begin, end):
         b, j, k = corner_row(r, shape)
-        for n in range(corners_of_row(near, b, j, k, extent)):
-            x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-            sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
-            value = distance_of(sums[0], profile, radius)
-            distance[corner_at(b, n - 2, j, k, shape)] = off_corner(value, spacing)
+        last = corners_of_row(near, b, j, k, extent)
+        row_seen = last > 0 and any_near(
+            b, 0, last, j, k, radius, start, lower, size, low, window, strides, spacing, origin, cells
+        )
+        for first in range(0, last, STRETCH):
+            end = min(first + STRETCH, last)
+            seen = row_seen and any_near(
+                b, first, end, j, k, radius, start, lower, size, low, window, strides, spacing, origin, cells
+            )
+            for n in range(first, end):
+                x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
+                sums[0] = 0.0
+                if seen:
+                    sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
+                value = distance_of(sums[0], profile, radius)
+                distance[corner_at(b, n - 2, j, k, shape)] = off_corner(value, spacing)
 
 
 @driver
@@ -236,12 +274,43 @@ def add_balls(
     corners along x."""
     for r in range(begin, end):
         b, j, k = corner_row(r, shape)
-        for n in range(corners_of_row(near, b, j, k, extent)):
-            at = corner_at(b, n - 2, j, k, shape)
-            if distance[at] > -largest:
-                x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-                value = nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides)
-                distance[at] = min(distance[at], off_corner(value, spacing))
+        last = corners_of_row(near, b, j, k, extent)
+        row_seen = last > 0 and any_near(
+            b, 0, last, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells
+        )
+        for first in range(0, last if row_seen else 0, STRETCH):
+            end = min(first + STRETCH, last)
+            seen = any_near(
+                b, first, end, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells
+            )
+            for n in range(first, end if seen else first):
+                at = corner_at(b, n - 2, j, k, shape)
+                if distance[at] > -largest:
+                    x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
+                    value = nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides)
+                    distance[at] = min(distance[at], off_corner(value, spacing))
+
+
+@row
+def count_shut(distance, c, n):
+    """How many of the n corners from c on are not in the fluid."""
+    count = 0
+    for i in range(n):
+        count += 1 if load(distance, c + i) <= 0.0 else 0
+    return count
+
+
+@row
+def open_row(before, fraction, aperture, at, face, cells, n):
+    """The n cells from `at` on, and their low faces, are open; returns how many were not `before`."""
+    count = 0
+    for i in range(n):
+        store(fraction, at + i, 1.0)
+        count += 1 if load(before, at + i) < 1.0 else 0
+    for d in static_range(DIMENSIONS):
+        for i in range(n):
+            store(aperture, face + d * cells + i, 1.0)
+    return count
 
 
 @driver
@@ -259,6 +328,16 @@ def open_up(begin, end, near, distance, before, fraction, aperture, shape, exten
         j, k = r % shape[1] - gy, r // shape[1] % shape[0] - gz
         is_cut[r] = 0
         if near[b] == 0 or j >= extent[b, 1] + gy or k >= extent[b, 2] + gz:
+            continue
+        at, c, n = cell_at(b, -2, j, k, shape), corner_at(b, -2, j, k, shape), extent[b, 0] + 4
+        shut = count_shut(distance, c, n + 1)
+        if DIMENSIONS > 1:
+            shut += count_shut(distance, c + sy, n + 1)
+        if DIMENSIONS > 2:
+            shut += count_shut(distance, c + sz, n + 1) + count_shut(distance, c + sz + sy, n + 1)
+        if shut == 0:
+            if open_row(before, fraction, aperture, at, at + b * (DIMENSIONS - 1) * cells, cells, n) > 0:
+                is_cut[r] = 1
             continue
         for i in range(-2, extent[b, 0] + 2):
             at, c = cell_at(b, i, j, k, shape), corner_at(b, i, j, k, shape)

@@ -195,8 +195,8 @@ class Coupling:
         impulse, home, image = team.empty((own, D)), team.empty(own, np.int64), team.array(np.ones((own, D)))
         team.run(
             self.kernels.push, own, self.solid.start, self.solid.start, *self.solid.columns.read("mass"), image,
-            impulse, home, self.reach, self._kick, self._shape, self._lower, self._widths, self._origin, self._extent,
-            self._seen_cells, *self._homes, self.blocks.first,
+            impulse, home, self.reach, self._kinds, kernels.COVERED, self._kick, self._shape, self._lower, self._widths,
+            self._origin, self._extent, self._seen_cells, *self._homes, self.blocks.first,
         )  # fmt: skip
         self._run(self.kernels.clear, self._covered, D, self._kick.reshape(-1), self._shape)
         self._ledger["wall"] -= self._per_block(kernels.COVERED_CELLS, self._passed)

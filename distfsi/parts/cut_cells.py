@@ -13,7 +13,7 @@ from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
 from distfsi.kernels import cut_fluxes, cut_forces, images
 from distfsi.kernels import rows as row_kernels
-from distfsi.kernels.band import FAR
+from distfsi.kernels.band import BAND, FAR
 from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
@@ -249,8 +249,8 @@ class CutCells:
         given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
         self.team.run(
             self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, self._image, given, home,
-            wall.seen, self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin, wall.extent,
-            self._seen_cells, wall.cells, *self._homes, self.blocks.first,
+            wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin,
+            wall.extent, self._seen_cells, wall.cells, *self._homes, self.blocks.first,
         )  # fmt: skip
         for cells in (self._band, *self._near_ghosts.cells):
             self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
