@@ -35,6 +35,7 @@ def solid(
     viscosity=(1.0, 2.0),
     form="updated_lagrangian",
     communicator=None,
+    smoothing=1.3,
     artificial_stress=0.0,
 ):
     """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
@@ -46,7 +47,7 @@ def solid(
         time=d.Time(1.0, 0.5, None),
         gravity=gravity or (0.0,) * D,
         fluid=None,
-        solid=d.Solid(tuple(bodies), 1.3, *viscosity, form=form, artificial_stress=artificial_stress),
+        solid=d.Solid(tuple(bodies), smoothing, *viscosity, form=form, artificial_stress=artificial_stress),
         output=d.Output("", 0.0, 1),
         performance=d.Performance((block_cells,) * D, (block_cells,) * D),
     )

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from distfsi.device import cpu
 from distfsi.device.seam import Columns
 from distfsi.kernels.material import deform
-from distfsi.parts.materials import CRACK_WIDTH, Materials, concrete_constants, weibull
+from distfsi.parts.materials import Materials, concrete_constants, crack_width, weibull
 from distfsi.physics import concrete, damage, strength
 from distfsi.scene import description as d
 
@@ -17,6 +17,7 @@ STEEL = d.JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0,
 STEEL_EOS = d.LinearEos(160e9)
 HJC_EOS = d.Compaction(16e6, 0.001, 0.80e9, 0.10, 85e9, -171e9, 208e9)
 HJC = d.Concrete(14.86e9, 48e6, 4e6, 0.79, 1.60, 0.61, 0.007, 7.0, 0.04, 1.0, 0.01, 1.0)
+WIDTH = crack_width(1.3, 3)  # spacings
 TENSION, SHEAR = np.diag([1.0, 0.0, 0.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
@@ -166,13 +167,13 @@ def test_a_crack_takes_its_energy_at_any_spacing(spacing):
         before, worn = point.deviator[0, 3], point.wear[0] >= 1.0
         point.strain(dt, rate * 0.5 * (SHEAR + SHEAR.T))
         work += worn * 0.5 * (before + point.deviator[0, 3]) * rate * dt
-    assert work * CRACK_WIDTH * spacing == pytest.approx(energy, rel=0.01)
+    assert work * WIDTH * spacing == pytest.approx(energy, rel=0.01)
 
 
 @pytest.mark.parametrize("spacing", [0.25e-3, 1e-3])
 def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
     """The work of the mean tension counts as that of plastic flow does; the elastic energy of shear does not."""
-    energy, dt, width = 2e4, 2e-9, CRACK_WIDTH * spacing
+    energy, dt, width = 2e4, 2e-9, WIDTH * spacing
     failure = d.JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
     point, work = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing), 0.0
     point.wear[:] = 1.0
@@ -184,17 +185,19 @@ def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
 
 
 @pytest.mark.parametrize("spacing", [0.5e-3, 1e-3, 2e-3])
-def test_a_brittle_crack_takes_its_energy_at_any_spacing(spacing):
+@pytest.mark.parametrize("aside", [0.0, -0.2, 1.0], ids=["held", "free to contract", "pulled on all sides"])
+def test_a_brittle_crack_takes_its_energy_at_any_spacing(spacing, aside):
     K, G, strength, energy = 16e9, 12e9, 4e6, 20.0
     failure = d.PrincipalStress(strength, energy, None)
-    point, dt, work, peak = Point(d.LinearEos(K), d.Elastic(G), failure=failure, spacing=spacing), 1.0, 0.0, 0.0
+    point, work, peak = Point(d.LinearEos(K), d.Elastic(G), failure=failure, spacing=spacing), 0.0, 0.0
+    strain = 2e-7 * np.diag([1.0, aside, aside])
     while point.damage[0] < 1.0:
-        before = point.normal_stress[0]
-        point.strain(dt, 2e-7 * TENSION)
-        work += 0.5 * (before + point.normal_stress[0]) * 2e-7
+        before = point.deviator[0, :3] - point.pressure[0]
+        point.strain(1.0, strain)
+        work += 0.5 * (before + point.deviator[0, :3] - point.pressure[0]) @ np.diag(strain)
         peak = max(peak, point.normal_stress[0])
     assert peak == pytest.approx(strength, rel=5e-3)
-    assert work * CRACK_WIDTH * spacing == pytest.approx(energy, rel=0.01)
+    assert work * WIDTH * spacing == pytest.approx(energy, rel=0.01)
 
 
 def test_a_failed_particle_carries_pressure_only():
@@ -319,7 +322,7 @@ def test_concrete_cracks_in_tension_and_carries_again_when_the_crack_is_closed()
         point.strain(1.0, 2e-6 * TENSION)
         peak = max(peak, point.normal_stress[0])
     assert peak == pytest.approx(3.6e6, rel=0.01)
-    assert 2440.0 / point.density[0] - 1.0 == pytest.approx(2.0 * 80.0 / (3.6e6 * CRACK_WIDTH * 5e-3), rel=0.07)
+    assert 2440.0 / point.density[0] - 1.0 == pytest.approx(2.0 * 80.0 / (3.6e6 * WIDTH * 5e-3), rel=0.07)
     assert abs(point.normal_stress[0]) < 1.0
     for _ in range(5000):
         point.strain(1.0, -2e-6 * TENSION)

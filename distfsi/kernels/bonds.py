@@ -5,7 +5,7 @@ weight w of physics/bonds.py, `partner[i]` the partner's row among a rank's own 
 (count, columns below) is what a force needs of a particle: stiffness, displacement, bond stress.
 """
 
-from math import log, sqrt
+from math import exp, log, sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.kernels.material import EOS_CONSTANTS, matrix_of
@@ -14,7 +14,8 @@ from distfsi.physics.bonds import (
     LEAST_GROWTH,
     bond_stress,
     bulk_viscosity,
-    is_other_face,
+    crack_seen,
+    is_face,
     largest_stretch,
     least_stretch,
     most_stretched,
@@ -33,6 +34,8 @@ STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond str
 # Columns of `facts`: what ghosts are told besides.
 VOLUME, BODY, DAMAGE, AROUND, LOOSE, EXPOSED, DEBRIS, PARTED, STRETCH, CRACK = range(10)
 OPENED = 0.5  # spacings: an opening that neither end of a bond sees as its own stretch
+LEAST_FITTED = 0.5  # of the volume that the material has: bonds on one side alone may make it any
+FAR = 1e300  # m2: no crack is seen
 SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crack
 
 
@@ -121,13 +124,15 @@ def fit(begin, end, chosen, bond_count, partner, bond, reference, tension, corre
 
 @driver
 def keep_fit(
-    begin, end, chosen, fitted, fitted_deformation, moments, least, exposed_below, correction, deformation, loose,
-    exposed,
+    begin, end, chosen, fitted, fitted_deformation, moments, least, exposed_below, mass, density, volume, void,
+    correction, deformation, loose, exposed,
 ):  # fmt: skip
-    """What fit() found of particle chosen[r], in row r, becomes its own, or it gets loose: too small a moment."""
+    """What fit() found of particle chosen[r], in row r, becomes its own, or it gets loose: too small a moment, or a
+    fit that is crushed where the material is not."""
     for r in range(begin, end):
         i = chosen[r]
-        if moments[r, 1] > least:
+        growth = exp(void[i]) * mass[i] / (density[i] * volume[i])
+        if moments[r, 1] > least and determinant(matrix_of(fitted_deformation, r)) > LEAST_FITTED * growth:
             for k in range(DIMENSIONS * DIMENSIONS):
                 correction[i, k] = fitted[r, k]
                 deformation[i, k] = fitted_deformation[r, k]
@@ -139,43 +144,57 @@ def keep_fit(
 
 @helper
 def crack_of(facts, i):
-    """Normal from a particle towards the crack beside it, 0 without."""
+    """Vector from a particle to the plane of the crack beside it, 0 without."""
     return tuple(facts[i, CRACK + d] for d in static_range(DIMENSIONS))
+
+
+@helper
+def crack_opening(deformation, bond_count, partner, bond, reference, tension, spacing, i):
+    """Vector to the crack of a particle that has failed: half a spacing along its most stretched direction, to the
+    side where its bonds are stretched more; 0 where it has bonds on one side only."""
+    axis = most_stretched(matrix_of(deformation, i))
+    across = times(matrix_of(deformation, i), axis)
+    ahead, behind, length2_ahead, length2_behind = 0.0, 0.0, 0.0, 0.0
+    for n in range(bond_count[i]):
+        j = partner[i, n]
+        X, u = difference(reference, 0, j, i), difference(tension, DISPLACEMENT, j, i)
+        w, along = bond_weight(bond, i, n), dot(X, axis)
+        if along > 0.0:
+            ahead += w * along * dot(u, across)
+            length2_ahead += w * along * along
+        else:
+            behind += w * along * dot(u, across)
+            length2_behind += w * along * along
+    side = 0.5 * spacing if ahead * length2_behind > behind * length2_ahead else -0.5 * spacing
+    side = side if min(length2_ahead, length2_behind) > 0.0 else 0.0
+    return tuple(side * axis[d] for d in static_range(DIMENSIONS))
 
 
 @driver
 def crack(
-    begin, end, spacing, body, bond_count, partner, bond, reference, tension, deformation, damage, facts, normal
+    begin, end, spacing, size, body, bond_count, partner, bond, reference, tension, deformation, damage, facts, plane
 ):  # fmt: skip
-    """normal[i] = unit vector, in the reference state, from a damaged particle to the crack beside it.
+    """plane[i] = vector, in the reference state, from a damaged particle to the plane of the crack beside it.
 
-    The crack of a particle that has failed lies across its most stretched direction, on the side where its bonds are
-    stretched more. A damaged particle just beyond it is its other face. `facts` are those of the step before.
+    Its partners' cracks count first, the nearest of those that it sees; then, if it has failed, its own. `facts` are
+    those of the step before.
     """
     for i in range(begin, end):
-        found = tuple(normal[i, d] for d in static_range(DIMENSIONS))
-        if damage[i] > 0.0 and dot(found, found) == 0.0:
-            axis = most_stretched(matrix_of(deformation, i))
-            across = times(matrix_of(deformation, i), axis)
-            ahead, behind, length2_ahead, length2_behind = 0.0, 0.0, 0.0, 0.0
+        apart = spacing[body[i]]
+        found = tuple(plane[i, d] for d in static_range(DIMENSIONS))
+        if damage[i] > 0.0 and not is_face(found, apart):
+            nearest = dot(found, found) if dot(found, found) > 0.0 else FAR
             for n in range(bond_count[i]):
                 j = partner[i, n]
-                X, u = difference(reference, 0, j, i), difference(tension, DISPLACEMENT, j, i)
-                w, along = bond_weight(bond, i, n), dot(X, axis)
-                if along > 0.0:
-                    ahead += w * along * dot(u, across)
-                    length2_ahead += w * along * along
-                else:
-                    behind += w * along * dot(u, across)
-                    length2_behind += w * along * along
-                other = crack_of(facts, j)
-                if is_other_face(X, other, spacing[body[i]]) and dot(found, found) == 0.0:
-                    found = tuple(-other[d] for d in static_range(DIMENSIONS))
-            if damage[i] >= 1.0 and dot(found, found) == 0.0 and min(length2_ahead, length2_behind) > 0.0:
-                side = 1.0 if ahead * length2_behind > behind * length2_ahead else -1.0
-                found = tuple(side * axis[d] for d in static_range(DIMENSIONS))
+                X = difference(reference, 0, j, i)
+                seen = crack_seen(X, crack_of(facts, j), apart, 2.0 * size[body[i]])
+                if 0.0 < dot(seen, seen) and dot(seen, seen) < nearest:
+                    found, nearest = seen, dot(seen, seen)
+            if damage[i] >= 1.0 and not is_face(found, apart):
+                own = crack_opening(deformation, bond_count, partner, bond, reference, tension, apart, i)
+                found = own if dot(own, own) > 0.0 else found
             for d in static_range(DIMENSIONS):
-                normal[i, d] = found[d]
+                plane[i, d] = found[d]
 
 
 @driver
@@ -196,8 +215,10 @@ def cut(begin, end, position, reference, spacing, body, facts, key, bond_count, 
             x, X = difference(position, 0, j, i), difference(reference, 0, j, i)
             mine, other = crack_of(facts, i), crack_of(facts, j)
             ahead, behind = dot(X, mine), -dot(X, other)
-            faces = dot(mine, other) < SAME_FACE
-            crossed = max(ahead, behind) > 0.5 * spacing[body[i]] or (faces and min(ahead, behind) > 0.0)
+            mine2, other2 = dot(mine, mine), dot(other, other)
+            faces = dot(mine, other) <= SAME_FACE * sqrt(mine2 * other2)
+            beyond = (ahead > mine2 and mine2 > 0.0) or (behind > other2 and other2 > 0.0)
+            crossed = beyond or (faces and min(ahead, behind) > 0.0)
             failed = min(facts[i, DAMAGE], facts[j, DAMAGE]) >= 1.0 and faces
             stretched = dot(x, x) > dot(X, X)
             widest = max(facts[i, STRETCH], facts[j, STRETCH]) * sqrt(dot(X, X)) + OPENED * spacing[body[i]]

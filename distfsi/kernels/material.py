@@ -12,7 +12,7 @@ from distfsi.physics.concrete import (
     concrete_wear,
     unloading_modulus,
 )
-from distfsi.physics.damage import crack_share, ductile_wear, largest_principal, tensile_damage
+from distfsi.physics.damage import crack_share, ductile_wear, elastic_energy, largest_principal, tensile_damage
 from distfsi.physics.rotation import polar_rotation, vorticity
 from distfsi.physics.smoothing import dilated
 from distfsi.physics.solid_eos import bulk_modulus, solid_pressure, solid_sound_speed
@@ -182,8 +182,9 @@ def carry(i, own, p, scale, stress, law, shear_modulus, failure, concrete, devia
     if FAILS:
         fracture = tuple(failure[own, k] for k in static_range(FAILURE_CONSTANTS))
         principal = scale * largest_principal(stress) - p
-        modulus = law[0] * law[1] * law[1] + 4.0 / 3.0 * shear_modulus
-        damage[i] = max(damage[i], tensile_damage(principal, modulus, toughness[i], fracture))
+        mises, tension = scale * von_mises(stress), max(-p, 0.0)
+        work = elastic_energy(mises, tension, shear_modulus, law[0] * law[1] * law[1])
+        damage[i] = max(damage[i], tensile_damage(principal, work, toughness[i], fracture))
         open_share = 1.0 - damage[i]
         share = carried_share(p, damage[i], concrete, own)
     for c in static_range(COMPONENTS):

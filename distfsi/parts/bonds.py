@@ -71,7 +71,7 @@ class TotalLagrangian:
     void              (n,) logarithm of how much larger a failed particle is with its void
     piece             (n,) smallest id of all particles that intact bonds hold together, as of label_pieces()
     around            (n,) largest damage of the particle and its partners so far
-    crack             (n, D) unit vector, in the reference state, towards the crack beside the particle; 0: none
+    crack             (n, D) vector, in the reference state, to the plane of the crack beside the particle [m]; 0: none
     loose             (n,) 1 when the particle leaves its bonds in the next step
     exposed           (n,) 1 when it lies at a surface
     """
@@ -278,7 +278,8 @@ class TotalLagrangian:
         spacing = (self._distance, *c.read("body"))
         if "damage" in c:
             known = (*c.read("deformation", "damage"), facts, *c.write("crack"))
-            self._run(near.own, "crack", *spacing, *self._bonds(c), self._reference, self._tensions, *known)
+            sizes = (self._distance, self._size, *c.read("body"))
+            self._run(near.own, "crack", *sizes, *self._bonds(c), self._reference, self._tensions, *known)
         bonds = (*c.write("bonds", "bond_count"), self._partner, self._bond)
         self._run(near.own, "cut", near.position, self._reference, *spacing, facts, *bonds, *c.write("parted"), lost)
         self._run(near.own, "mark_cut", lost, mark)
@@ -286,8 +287,9 @@ class TotalLagrangian:
         if not count:
             return
         fitted = self._fit(count, rows, c, self._tensions)
+        volumes = c.read("mass", "density", "volume", "void")
         kept = c.write("correction", "deformation", "loose", "exposed")
-        self._run(count, "keep_fit", rows, *fitted, LOOSE_BELOW, EXPOSED_BELOW, *kept)
+        self._run(count, "keep_fit", rows, *fitted, LOOSE_BELOW, EXPOSED_BELOW, *volumes, *kept)
         self._contact.forget()
         self._cut_since_labelled = True
 

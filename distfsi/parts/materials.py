@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from distfsi.device.emit import plain
 from distfsi.device.seam import Columns
 from distfsi.physics.concrete import dense_pressure
+from distfsi.physics.smoothing import smoothing_slope
 from distfsi.scene.description import (
     Body,
     Compaction,
@@ -39,7 +41,6 @@ from distfsi.scene.description import (
 
 ROOM_TEMPERATURE = 293.15  # K, of materials that do not know their own
 NOT_CONCRETE = (0.0,) * 20
-CRACK_WIDTH = 2.2  # spacings: a row of particles on either side of a crack and, with h = 1.3 spacings, a tenth beyond
 NO_FAILURE = (math.inf, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0)
 
 
@@ -64,9 +65,10 @@ class Materials:
 
     def __init__(self, solid: Solid, dimensions: int):
         self.bodies, self.dimensions = solid.bodies, dimensions
+        self._crack_width = crack_width(solid.smoothing, dimensions)
         self.tables = tuple(
             np.array([row(body) for body in solid.bodies])
-            for row in (_eos_row, lambda body: strength_constants(body.strength), _failure_row, _concrete_row)
+            for row in (_eos_row, lambda body: strength_constants(body.strength), self._failure_row, _concrete_row)
         )
         self.constants = {
             "POLAR_ROTATION": solid.objective_rate == "green_naghdi",
@@ -74,6 +76,9 @@ class Materials:
             "CONCRETE": any(isinstance(body.strength, Concrete) for body in solid.bodies),
         }
         self.columns = self._columns()
+
+    def _failure_row(self, body: Body) -> tuple[float, ...]:
+        return failure_constants(body.failure, self._crack_width * body.spacing)
 
     def _columns(self) -> tuple[Column, ...]:
         components = self.dimensions * (self.dimensions + 1) // 2
@@ -169,6 +174,21 @@ def failure_constants(failure: Failure | None, size: float) -> tuple[float, ...]
             return *NO_FAILURE[:6], tensile_strength, fracture_energy, size
 
 
+def crack_width(smoothing: float, dimensions: int) -> float:
+    """The width [spacings] in which particles beside a crack take its energy, `smoothing` spacings being h.
+
+    A crack that opens by d between two rows of a square lattice strains the rows at it by d over this width, and those
+    beyond by less, as fewer of their bonds cross it: with linear softening all rows together take, as their strains
+    sum up to d, what this width would take evenly.
+    """
+    reach = np.arange(-math.ceil(2.0 * smoothing), math.ceil(2.0 * smoothing) + 1.0)
+    X = np.stack(np.meshgrid(*[reach] * dimensions, indexing="ij"))
+    distance2 = np.sum(X**2, axis=0)
+    slope = plain(smoothing_slope, {"DIMENSIONS": dimensions})(distance2, smoothing)
+    weight = np.where(distance2 < 4.0 * smoothing**2, -slope, 0.0)
+    return float(np.sum(weight * X[0] ** 2) / np.sum(weight * np.maximum(X[0], 0.0)))
+
+
 def concrete_constants(eos: Compaction, strength: Concrete, cracks: bool) -> tuple[float, ...]:
     """The tuple `concrete` of physics/concrete.py; `cracks`: a failure model limits the tension."""
     dense = (0.0, 0.0, 0.0, eos.lock_strain, 0.0, eos.K1, eos.K2, eos.K3)
@@ -188,10 +208,6 @@ def concrete_constants(eos: Compaction, strength: Concrete, cracks: bool) -> tup
 
 def _eos_row(body: Body) -> tuple[float, ...]:
     return eos_constants(body.eos, body.density)
-
-
-def _failure_row(body: Body) -> tuple[float, ...]:
-    return failure_constants(body.failure, CRACK_WIDTH * body.spacing)
 
 
 def _concrete_row(body: Body) -> tuple[float, ...]:

@@ -133,10 +133,24 @@ def most_stretched(deformation):
     return tuple(column[d] / length for d in static_range(DIMENSIONS))
 
 
-def is_other_face(X, normal, spacing):
-    """Whether a particle is the first beyond the crack that lies from a partner along its `normal`; X: to the partner.
+def is_face(crack, spacing):
+    """Whether the plane of a `crack` (vector to it; 0: none) lies right beside a particle."""
+    distance2 = dot(crack, crack)
+    return 0.0 < distance2 and distance2 < spacing * spacing
 
-    No normal (0) says no.
+
+def crack_seen(X, crack, spacing, reach):
+    """Vector to the plane of a partner's `crack` (vector from there; 0: none); X: to the partner. 0: not seen.
+
+    Those see it that are next to the partner across the plane or away from it: half a spacing beyond the crack of a
+    face, which makes the other face; or behind it, if bonds of this `reach` get past the other face from there.
     """
-    beyond = -dot(X, normal)
-    return 0.5 * spacing < beyond and beyond < 1.5 * spacing and dot(X, X) - beyond * beyond < 0.75 * spacing * spacing
+    distance = sqrt(dot(crack, crack))
+    along = dot(X, crack) / max(distance, SHORTEST)
+    aside2 = dot(X, X) - along * along
+    near = 0.5 * spacing < abs(along) and abs(along) < 1.5 * spacing and aside2 < 0.75 * spacing * spacing
+    other_face = near and along < 0.0 and distance < spacing
+    behind = near and along > 0.0 and distance + along + 1.5 * spacing < reach
+    seen = -0.5 * spacing if other_face else (distance + along if behind else 0.0)
+    share = seen / max(distance, SHORTEST)
+    return tuple(share * crack[d] for d in static_range(DIMENSIONS))

@@ -57,15 +57,19 @@ def crack_share(work, failure):
     return work * size / (2.0 * max(fracture_energy, BRITTLE))
 
 
-def tensile_damage(principal, modulus, toughness, failure):
+def elastic_energy(mises, tension, shear_modulus, bulk_modulus):
+    """Energy [J/m3] that a crack lets go: of the deviator (its von Mises stress `mises`) and of a mean `tension`."""
+    return mises * mises / max(6.0 * shear_modulus, BRITTLE) + 0.5 * tension * tension / bulk_modulus
+
+
+def tensile_damage(principal, energy, toughness, failure):
     """D of a crack across the largest `principal` stress of the intact material: linear softening (Hillerborg 1976).
 
-    `modulus` [Pa] turns strain across the crack into stress. A particle too large to let its energy out slowly fails
-    at once.
+    `energy` [J/m3] is that of the intact material under its stress, so that the crack takes its own however the
+    material is held across its direction. A particle too large to let its energy out slowly fails at once.
     """
     D1, D2, D3, D4, D5, reference_rate, tensile_strength, fracture_energy, size = failure
-    limit = toughness * tensile_strength
-    ratio = max(principal / limit, 1.0)
-    widest = 2.0 * fracture_energy * modulus / (limit * limit * size)  # strain of the open crack over that at its start
+    ratio = max(principal / (toughness * tensile_strength), 1.0)
+    widest = fracture_energy * ratio * ratio / (max(energy, BRITTLE) * size)  # strain of the open crack over the first
     soft = widest * (ratio - 1.0) / (ratio * max(widest - 1.0, BRITTLE))
     return (min(soft, 1.0) if widest > 1.0 else 1.0) if ratio > 1.0 else 0.0
