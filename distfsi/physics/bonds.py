@@ -71,7 +71,7 @@ def zero_energy_stiffness(density, sound_speed, plastic_strain, damage, shear_mo
     shear has a twentieth of its longitudinal modulus instead of its shear modulus.
     """
     softer = 1.0 + SOFTENING * shear_modulus * plastic_strain / max(flow_stress, 1e-300)
-    whole = (1.0 - damage) * (1.0 - damage)
+    whole = 1.0 - damage
     return ZERO_ENERGY * whole * whole * max(shear_modulus, 0.05 * density * sound_speed * sound_speed) / softer
 
 
