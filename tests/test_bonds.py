@@ -346,6 +346,21 @@ def test_hot_debris_swells_until_it_has_no_pressure():
     assert energy(part) == pytest.approx(whole, rel=1e-12)
 
 
+@pytest.mark.parametrize(("thickness", "held"), [(0.6, True), (0.4, False)])
+def test_bonds_that_fit_less_than_half_of_the_materials_volume_let_go(thickness, held):
+    part = failed_block(COPPER_EOS)
+    c = part.columns
+    c["position"][:, 1] *= thickness  # and the density stays that of the reference state
+    c["loose"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
+    lost = c["bond_count"].copy()
+    for _ in range(2):
+        part.prepare()
+    beside = (c["reference"][:, 1] < 0.015) & (c["reference"][:, 1] > 0.013)
+    assert beside.any() and np.all(c["bond_count"][beside] < lost[beside])
+    assert np.all((c["bond_count"][beside] > 0) == held)
+    assert (c["bond_count"][c["reference"][:, 1] < 0.005] == lost[c["reference"][:, 1] < 0.005]).all()
+
+
 def test_a_spring_that_was_never_pressed_does_not_push():
     """Bonds that are cut while they are short leave no force behind; what comes closer afterwards is pushed back."""
     part = failed_block(COPPER_EOS)
