@@ -141,15 +141,33 @@ def sinking_plate(threads, block, scheme):
     return Coupled([plate], regions, lower, upper, cells, kinds, block, threads, AIR_AND_WATER, scheme=scheme), 25
 
 
+def speck(place, side, density, velocity):
+    """A lone particle."""
+    upper = tuple(x + side for x in place)
+    return body(d.Box(tuple(place), upper), side, density, velocity, stiffness=1.0)
+
+
 def stretched_plate(threads, block, scheme):
-    """A plate of bonds, pulled to three times its length across all blocks; gas on one side."""
+    """A plate of bonds, pulled to three times its length across all blocks; gas on one side, and four lone particles,
+    two of them in one cell."""
     plate = body(d.Box((0.35, -0.1), (0.5, 1.1)), 0.05, 100.0, (0, 0), stiffness=1.0)
+    places = ((0.21, 0.52), (0.26, 0.56), (0.9, 0.38), (0.72, 0.61))
+    dust = [speck(place, 0.02, 30.0, (3.0 * (place[0] - 0.5), -1.0)) for place in places]
     regions = [(gas(1.0, 1e-2, (0, 0)), None), (gas(1.0, 1.0, (0, 0)), d.Box((0.0, 0.0), (0.4, 1.0)))]
     case = Coupled(
-        [plate], regions, (0.0, 0.0), (1.0, 1.0), (10, 10), None, block, threads, scheme=scheme, form="total_lagrangian"
+        [plate, *dust],
+        regions,
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (10, 10),
+        None,
+        block,
+        threads,
+        scheme=scheme,
+        form="total_lagrangian",
     )
     c = case.solid.columns
-    c["velocity"][:, 1] = 10.0 * (c["position"][:, 1] - 0.48)
+    c["velocity"][c["body"] == 0, 1] = 10.0 * (c["position"][c["body"] == 0, 1] - 0.48)
     return case, 25
 
 

@@ -2,7 +2,18 @@
 
 import pytest
 
-from distfsi.kernels import bonds, contact, coupling, cut_cells, cut_fluxes, cut_forces, cut_geometry, solid
+from distfsi.kernels import (
+    bonds,
+    contact,
+    coupling,
+    cut_cells,
+    cut_fluxes,
+    cut_forces,
+    cut_geometry,
+    dust,
+    images,
+    solid,
+)
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
@@ -14,7 +25,7 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 FAILING = ("crack", "cut", "look_around", "mark_damaged")
 NOT_REACHED = (*FAILING, "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
 FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
-SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_fluxes, cut_forces, cut_geometry)}
+SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images)}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
 OF_OTHER_SCHEMES["stairs"] = {"evict", "put_moved", "cover_evicted"}  # no cell is small before it is shut
@@ -40,7 +51,8 @@ def _name(module) -> str:
 
 
 def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, scheme: str, form: str):
-    """A ball of steel, fast and thick, and a thin plate in a box of gas: cells get covered, deep and fresh."""
+    """A ball of steel, fast and thick, a thin plate and a lone particle in a box of gas: cells get covered, deep and
+    fresh."""
     D = dimensions
     path.write_text(
         f"""
@@ -68,6 +80,11 @@ velocity = {[3000, 500, 250][:D]}
 [solid.bodies.plate]
 shape = {{ kind = "box", lower = {["1.4 mm", *["2 mm"] * (D - 1)]}, upper = {["2.1 mm", *["14 mm"] * (D - 1)]} }}
 spacing = "0.7 mm"
+{STEEL}
+[solid.bodies.speck]
+shape = {{ kind = "box", lower = {["14 mm"] * D}, upper = {["14.7 mm"] * D} }}
+spacing = "0.7 mm"
+velocity = {[-500, 0, 0][:D]}
 {STEEL}
 """
     )

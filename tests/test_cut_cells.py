@@ -14,9 +14,10 @@ from distfsi.kernels.cut_geometry import SHUT
 from distfsi.parts import solid as solid_part
 from distfsi.parts.wall_geometry import plane_profile
 from distfsi.physics import apertures
+from distfsi.physics import drag as physics_drag
 from distfsi.scene import description as d
 from distfsi.scene.description import Ball, Box, HalfSpace
-from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock, speck
 
 HEAVY = 1e15  # so dense that nothing changes a body's velocity
 OPEN = ("outflow", "outflow")
@@ -87,6 +88,7 @@ def test_an_image_counts_where_its_body_reaches_the_end_of_the_domain(dimensions
     place, opened = case.solid.columns["position"].copy(), []
     for gap in gaps:
         case.solid.columns["position"] = place + gap * (np.arange(D) == D - 1)
+        case.coupling._look(*case.solid.columns.read("position"))
         case.coupling._cut(*case.solid.columns.read("position", "velocity"))
         beneath = case.grid_of(case.coupling.wall.fractions[1].here())[0]
         opened.append(beneath[(0,) * (3 - D) + (0,) + (n // 2,) * (D - 1)])
@@ -546,6 +548,56 @@ def test_a_film_between_sliding_bodies_is_squeezed_out_and_comes_back():
     assert abs(case.balance()[0] - before) < 1e-13
 
 
+# ---- lone particles --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimensions", [2, pytest.param(3, marks=pytest.mark.full)])
+def test_a_lone_particle_is_dragged_along_as_a_sphere(dimensions):
+    """As m dv/dt = 1/2 rho Cd A (u - v)^2 says; gas that it goes along with does not change by a bit."""
+    D, side, density = dimensions, 0.02 / 16, 20.0
+    drag = {
+        name: plain(getattr(physics_drag, name), {"DIMENSIONS": D}) for name in ("drag_coefficient", "frontal_area")
+    }
+    u, speeds, times = 0.5, {}, {}
+    for v in (0.0, u):
+        particle = speck((0.3,) * D, side, density, (v, *(0.0,) * (D - 1)))
+        stream = gas(1.4, 1.0, (u, *(0.0,) * (D - 1)))
+        case = coupled(
+            [particle], [(stream, None)], (0.0,) * D, (1.0,) * D, (16,) * D, (OPEN,) * D, form="total_lagrangian"
+        )
+        before, state = case.balance(), case.fluid.state.copy()
+        while case.simulation.time < 0.1:
+            case.step()
+        speeds[v], times[v] = case.solid.columns["velocity"][0, 0], case.simulation.time
+        assert np.abs(case.balance() - before).max() < 1e-12
+    assert speeds[u] == u and np.array_equal(case.fluid.state, state)
+    slip, steps = u, 4000
+    for _ in range(steps):  # the speed of sound is 1
+        force = 0.5 * 1.4 * drag["drag_coefficient"](slip) * drag["frontal_area"](side**D) * slip**2
+        slip -= times[0.0] / steps * force / (density * side**D)
+    assert 0.2 < slip / u < 0.8 and u - speeds[0.0] == pytest.approx(slip, rel=1e-2)
+
+
+@pytest.mark.parametrize("phases", [AIR, pytest.param(AIR_AND_WATER, marks=pytest.mark.full)])
+def test_a_cloud_of_debris_that_flies_apart_turns_to_dust(phases):
+    """All books close, no state is negative, and what was its wall opens."""
+    places = 0.5 + 0.03 * (np.stack(np.meshgrid(*[np.arange(5)] * 2), -1).reshape(-1, 2) - 2.25)
+    cloud = [speck(tuple(x), 0.02, 30.0, tuple(12.0 * (x - 0.5))) for x in places]
+    regions = [(gas(1.0, 1.0, (0.2, 0)), None)]
+    if len(phases) == 2:
+        regions.append((gas(5.0, 1.0, (0.2, 0), 1), HalfSpace((0.5, 0.5), (-1.0, 0.2))))
+    case = coupled(cloud, regions, (0.0, 0.0), (1.0, 1.0), (20, 20), phases=phases, form="total_lagrangian")
+    before, gone, c = case.balance(), [], case.solid.columns
+    while case.simulation.time < 0.3:
+        case.step()
+        gone.append((c["dust"] > 0).sum())
+        W = primitives(case)[:, volumes(case) > 0.0]
+        assert W[: len(phases)].min() > 0.0 and W[len(phases) + 2].min() > 0.0
+    assert gone[0] < gone[-1] == len(places) and (np.diff(gone) >= 0).all()
+    assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
+    assert (case.grid_of(case.coupling.wall.fractions[1].here()) == 1.0).all()
+
+
 # ---- restart --------------------------------------------------------------------------------------------------------
 
 
@@ -564,8 +616,11 @@ def test_a_restart_goes_on_to_the_same_bits():
 
     def case():
         disc = body(Ball((0.4, 0.4), 0.15), 0.02, 3.0, (0.8, 0.3), stiffness=1000.0)
+        dust = [speck((x, 0.6), 0.02, 30.0, (-0.5, 0.1)) for x in (0.13, 0.16, 0.22)]
         regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 5.0, (0, 0), 1), Box((0.0, 0.0), (0.2, 0.2)))]
-        return coupled([disc], regions, (0.0, 0.0), (0.8, 0.8), (20, 20), phases=AIR_AND_WATER)
+        return coupled(
+            [disc, *dust], regions, (0.0, 0.0), (0.8, 0.8), (20, 20), phases=AIR_AND_WATER, form="total_lagrangian"
+        )
 
     straight, restarted = case(), case()
     for _ in range(12):

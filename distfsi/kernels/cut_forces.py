@@ -11,6 +11,7 @@ from distfsi.kernels.contact import side_of_cube
 from distfsi.kernels.coupling import center_of
 from distfsi.kernels.cut_cells import share_at, way_to_master
 from distfsi.kernels.cut_geometry import step_to
+from distfsi.kernels.dust import DUST, WALL
 from distfsi.kernels.gather import sum_particles
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
@@ -29,18 +30,18 @@ def part_inside(position, i, volume, lower, upper):
 
 
 @driver
-def keep_mass(begin, end, start, mass, density, lower, upper, kept):
-    """kept[i] = mass of a particle, 0 if it was outside the domain at the `start`."""
+def keep_mass(begin, end, start, dust, mass, density, lower, upper, kept):
+    """kept[i] = mass of a particle of a wall, 0 if it was outside the domain at the `start`."""
     for i in range(begin, end):
         inside = part_inside(start, i, mass[i] / density[i], lower, upper) > 0.0
-        kept[i] = mass[i] if inside else 0.0
+        kept[i] = mass[i] if inside and dust[i] != DUST else 0.0
 
 
 @driver
-def find_volumes(begin, end, mass, density, volume):
-    """volume[i] (n, 1) of a particle."""
+def find_volumes(begin, end, dust, mass, density, volume):
+    """volume[i] (n, 1) of a particle of a wall, 0 of lone ones."""
     for i in range(begin, end):
-        volume[i, 0] = mass[i] / density[i]
+        volume[i, 0] = mass[i] / density[i] if dust[i] == WALL else 0.0
 
 
 @driver

@@ -44,7 +44,7 @@ def weigh_images(
                         row = k * strides[2] + j * strides[1]
                         for n in range(start[row + bx[0]], start[row + bx[1]]):
                             q = order[n]
-                            if key[q] % IMAGE_BITS == 0:
+                            if key[q] % IMAGE_BITS == 0 and volume[q, 1] > 0.0:
                                 dx = tuple(position[q, d] - foot[d] for d in static_range(DIMENSIONS))
                                 above = max(sign * dx[axis] - 0.5 * side_of_cube(volume[q, 1]), 0.0)
                                 gap = min(gap, above + max(way_along(dx, axis) - aside, 0.0))

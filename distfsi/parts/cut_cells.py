@@ -21,6 +21,8 @@ from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.particles import GhostPlan, ParticleExchange
 from distfsi.mesh.rows import Groups
+from distfsi.parts import dust
+from distfsi.parts.dust import Dust
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
 from distfsi.parts.solid import Solid
@@ -47,6 +49,7 @@ PARTICLE_DRIVERS = (
     cut_forces.find_pressures,
     cut_forces.find_debts,
     cut_forces.clear,
+    *dust.PARTICLE_DRIVERS,
     images.weigh_images,
     images.fade_images,
     immersed_kernels.push,
@@ -69,6 +72,7 @@ FLUID_DRIVERS = (
     kernels.keep_volumes,
     cut_forces.spread_impulse,
     cut_forces.pay_debts,
+    *dust.FLUID_DRIVERS,
 )
 
 
@@ -107,6 +111,9 @@ class CutCells:
         self.stray = FARTHEST_MOVE * float(self._spacing[: self._dimensions].min())
         self._corners = [team.array(np.array(corner)) for corner in (grid.lower, grid.upper)]
         self._homes = [team.array(np.array(values)) for values in (blocks.block_cells, blocks.curve_index)]
+        place = (self.wall.shape, self._corners[0], self.wall.spacing, self.wall.origin, self.wall.cells, *self._homes)
+        built = (self.kernels, self.fluid_kernels)
+        self.dust = Dust(solid.columns, self._particles.rows, built, self.wall, *place, blocks.first)
         self._cell_volume = float(self._spacing.prod())
         self._initial = InitialState(scene.fluid, model)
         self._rest = self._state_at_rest(scene)
@@ -126,6 +133,8 @@ class CutCells:
         self._find_sides()
         self._keep_lists([team.empty(0, np.int64)] * 3, np.zeros((blocks.local_count, 3), dtype=np.int64))
         (position,) = solid.columns.read("position")
+        self._look(position)
+        self.dust.find(solid.columns, self._middle, self._middle_bins)
         for _ in range(2):
             self._cut(position, team.zeros(position.shape))
         self._fill_at_start()
@@ -181,6 +190,8 @@ class CutCells:
     def follow(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         team, D = self.team, self._dimensions
+        self._look(self.solid.start)
+        self.dust.find(self.solid.columns, self._middle, self._middle_bins)
         self._cut(self.solid.start, self.solid.carried)
         self._find_company()
         n = self._band.shape[0]
@@ -207,6 +218,7 @@ class CutCells:
     def after_stage(self, stage: Stage, dt: float) -> None:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
         rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
+        self._dt = dt
         rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
         boxes = -(-self._faces.shape[0] // self.team.lanes)
         given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
@@ -254,7 +266,20 @@ class CutCells:
         )  # fmt: skip
         for cells in (self._band, *self._near_ghosts.cells):
             self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
+        rows = self.dust.rows(self.solid.columns)
+        self._dragged = self.drag(rows, given) if rows.shape[0] else np.zeros((self.blocks.local_count, D + 1))
         return given
+
+    def drag(self, rows: Any, impulse: Any) -> np.ndarray:
+        """The fluid drags the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
+        found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
+        block, paid = self.dust.drag(
+            self.solid.columns, rows, self.solid.start, self._dt, impulse, self.fluid, self._swept
+        )
+        sums = np.zeros((self.blocks.local_count, self._dimensions + 1))
+        np.add.at(sums, block, paid)
+        self.fluid.wake(np.bincount(block, minlength=len(sums)) > 0)
+        return sums
 
     def book_work(self, excess: Any) -> None:
         """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
@@ -270,8 +295,8 @@ class CutCells:
             self.fluid_kernels.pay_debts, self._joined, paid, debt, self.fluid.there, self._swept, *self._company
         )  # fmt: skip
         impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self._impulse, self._work, paid))
-        self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse
-        self._wall_sums[:, -1] += self.solid.work - work[:, 0] - extra[:, 0]
+        self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse - self._dragged[:, :-1]
+        self._wall_sums[:, -1] += self.solid.work - work[:, 0] - extra[:, 0] - self._dragged[:, -1]
 
     def pressure(self, dt: float) -> float:
         """Collective. The highest mean pressure [Pa] on a cell's wall in the last step, of `dt` [s]."""
@@ -295,18 +320,22 @@ class CutCells:
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
-    def _cut(self, start: Any, velocity: Any) -> None:
-        """The cells cut by this rank's particles and those around, which have moved from `start` with `velocity`."""
-        c, team, wall, own = self.solid.columns, self.team, self.wall, self.solid.count
-        self._own_mass, self._own_middle = team.empty(own), team.empty(start.shape)
+    def _look(self, start: Any) -> None:
+        """The particles around this rank's, which have moved from `start`."""
+        c, team, own = self.solid.columns, self.team, self.solid.count
+        self._own_middle = team.empty(start.shape)
         team.run(self.kernels.find_middle, own, start, *c.read("position"), self._own_middle)
-        team.run(self.kernels.keep_mass, own, start, *c.read("mass", "density"), *self._corners, self._own_mass)
         self._plan = self._ghosts(start, c["id"])
+        (self._middle,) = self._plan.exchange([(self._own_middle, "position")])
+        self._middle_bins = self.wall.sort(self._middle, self._plan.key.there)
+
+    def _cut(self, start: Any, velocity: Any) -> None:
+        """The cells cut by the particles that _look() has found, which have moved from `start` with `velocity`."""
+        c, team, wall, own = self.solid.columns, self.team, self.wall, self.solid.count
+        self._own_mass, known = team.empty(own), c.read("dust", "mass", "density")
+        team.run(self.kernels.keep_mass, own, start, *known, *self._corners, self._own_mass)
         vector = tuple((a,) for a in range(self._dimensions))
-        self._middle, self._particle_velocity, self._mass = self._plan.exchange(
-            [(self._own_middle, "position"), (velocity, vector), (self._own_mass, ((),))]
-        )
-        self._middle_bins = wall.sort(self._middle, self._plan.key.there)
+        self._particle_velocity, self._mass = self._plan.exchange([(velocity, vector), (self._own_mass, ((),))])
         point, size, number = self._points.of(c)
         inside = team.empty((point.shape[0], 2))
         team.run(self.kernels.keep_inside, point.shape[0], point, size, *self._corners, inside)
@@ -318,7 +347,7 @@ class CutCells:
         team.run(self.kernels.fade_images, plan.count, plan.key.there, image, 2, volume.reshape(-1))
         if number is not c["id"]:
             size = team.empty((own, 1))
-            team.run(self.kernels.find_volumes, own, *c.read("mass", "density"), size)
+            team.run(self.kernels.find_volumes, own, *known, size)
             self._image, image = self._weigh_images(self._plan, *c.read("position"), size, points)
         team.run(self.kernels.fade_images, self._plan.count, self._plan.key.there, image, 1, self._mass)
         (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((), *vector))])
@@ -486,6 +515,7 @@ class CutCells:
         self.wall.near.here()[:] = 1
         self.wall.near.changed()
         position, velocity = self.solid.columns.read("position", "velocity")
+        self._look(position)
         self._cut(position, velocity)
 
     def ledger(self) -> dict[str, np.ndarray]:

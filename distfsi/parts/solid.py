@@ -329,7 +329,7 @@ class Solid:
         c = {name: column[rows] for name, column in self.columns.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
-        names += [name for name in ("piece",) if name in c]
+        names += [name for name in ("piece", "dust") if name in c]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant
 

@@ -31,7 +31,7 @@ class WallPoints:
         particles, whose columns are `c`; the numbers are the particles' ids where there are no bonds."""
         (position,), own = c.read("position"), len(c["id"])
         volume = self._device.empty((own, 1))
-        self._device.run(self._kernels.find_volumes, own, *c.read("mass", "density"), volume)
+        self._device.run(self._kernels.find_volumes, own, *c.read("dust", "mass", "density"), volume)
         if "deformation" not in c:
             return position, volume, c["id"]
         mark, number = self._device.empty(own, np.int8), c["id"] * PER_PARTICLE

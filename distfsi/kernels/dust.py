@@ -1,0 +1,151 @@
+"""Loops of lone particles: which they are, and the drag between them and the gas of the cells that they are in.
+
+Cells are named as in kernels/coupling.py. `rows` (n,): the particles that are lone, in the order of their ids; `at`
+(n,): the cells that they are in; `place` (n, D) and what follows it: where they are, and the fields of SearchCells.
+"""
+
+from math import floor
+
+from distfsi.device.markers import driver, helper, load, real, store, workspace
+from distfsi.kernels.coupling import cell_at, home_of, three
+from distfsi.kernels.cut_cells import share_at, state_at
+from distfsi.kernels.gather import bins_around
+from distfsi.physics.drag import mass_that_follows
+from distfsi.physics.subset import static_range
+from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES, primitives, sound_speed
+from distfsi.physics.tensors import dot
+
+# What a particle is: part of a wall; lone, but still pushed by the wall that it was when the step began; lone.
+WALL, LEAVING, DUST = range(3)
+
+
+@driver
+def find_dust(
+    begin, end, dust, fixed, bond_count, radius, fewest, position, start, order, lower, size, low, window, strides
+):
+    """dust[i] = what a particle is. It leaves the wall when it has no bonds and there are fewer than the `fewest`
+    particles, itself among them, within `radius` [m]; it never comes back."""
+    for i in range(begin, end):
+        if dust[i] == LEAVING:
+            dust[i] = DUST
+        if dust[i] == WALL and bond_count[i] == 0 and not fixed[i]:
+            together = 0
+            x = tuple(position[i, d] for d in static_range(DIMENSIONS))
+            bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
+            for k in range(bz[0], bz[1]):
+                for j in range(by[0], by[1]):
+                    row = k * strides[2] + j * strides[1]
+                    for n in range(start[row + bx[0]], start[row + bx[1]]):
+                        dx = tuple(x[d] - position[order[n], d] for d in static_range(DIMENSIONS))
+                        if dot(dx, dx) < radius * radius:
+                            together += 1
+            if together < fewest:
+                dust[i] = LEAVING
+
+
+@driver
+def mark_dust(begin, end, dust, mark):
+    """mark[i] = 1 where a particle is lone, else 0."""
+    for i in range(begin, end):
+        mark[i] = 1 if dust[i] == DUST else 0
+
+
+@driver
+def feel_gas(
+    begin, end, rows, place, at, follows, velocity, mass, density, U, swept, dt, shape, lower, spacing, origin,
+    grid_cells, block_cells, curve_index, first_block,
+):  # fmt: skip
+    """at[n] = the cell that a lone particle is in, -1 where there is no fluid; follows[n] [kg] of its mass (see
+    physics/drag.py)."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        p, x = rows[n], three(place, n)
+        at[n], follows[n] = -1, 0.0
+        index = tuple(int(floor((x[d] - lower[d]) / spacing[d])) for d in static_range(3))
+        inside = True
+        for d in static_range(DIMENSIONS):
+            inside = inside and index[d] >= 0 and index[d] < grid_cells[d]
+        if inside:
+            b = home_of(x, lower, spacing, grid_cells, block_cells, curve_index) - first_block
+            here = cell_at(b, index[0] - origin[b, 0], index[1] - origin[b, 1], index[2] - origin[b, 2], shape)
+            if load(swept, share_at(here, cells)) > 0.0:
+                state, v = state_at(U, here, cells), tuple(real(velocity[p, d]) for d in static_range(DIMENSIONS))
+                W = primitives(state)
+                at[n] = here
+                m, volume = real(mass[p]), real(mass[p] / density[p])
+                follows[n] = mass_that_follows(state, W, sound_speed(W), v, m, volume, real(dt))
+
+
+@driver
+def drag(
+    begin, end, rows, place, at, follows, velocity, U, swept, volume, impulse, shape, spacing, start, order, lower,
+    size, low, window, strides,
+):  # fmt: skip
+    """impulse[p] (D,) [N s] = what the gas of its cell, of a `volume`, gives to a lone particle in a step: all that are
+    in the cell come nearer to one velocity at once."""
+    cells = shape[0] * shape[1] * shape[2]
+    sums = workspace(1 + DIMENSIONS)
+    for n in range(begin, end):
+        if at[n] >= 0:
+            state = state_at(U, at[n], cells)
+            filled = load(swept, share_at(at[n], cells)) * volume
+            sums[0] = filled * sum(state[k] for k in static_range(PHASES))
+            for d in static_range(DIMENSIONS):
+                sums[1 + d] = filled * state[PHASES + d]
+            x = tuple(place[n, d] for d in static_range(DIMENSIONS))
+            reach = tuple(spacing[d] for d in static_range(DIMENSIONS))
+            bx, by, bz = bins_around(x, reach, lower, size, low, window)
+            for k in range(bz[0], bz[1]):
+                for j in range(by[0], by[1]):
+                    row = k * strides[2] + j * strides[1]
+                    for m in range(start[row + bx[0]], start[row + bx[1]]):
+                        q = order[m]
+                        if at[q] == at[n]:
+                            sums[0] += follows[q]
+                            for d in static_range(DIMENSIONS):
+                                sums[1 + d] += follows[q] * velocity[rows[q], d]
+            for d in static_range(DIMENSIONS):
+                impulse[rows[n], d] = follows[n] * (sums[1 + d] / sums[0] - velocity[rows[n], d])
+
+
+@helper
+def pay(U, energy, at, cells, part, paid, n):
+    """Take impulse and work out of a cell, whose energy is at `energy`, and which is filled by a volume `part`."""
+    for d in static_range(DIMENSIONS):
+        place = energy - (DIMENSIONS - d) * cells
+        store(U, place, load(U, place) - paid[n, d] / part)
+    store(U, energy, load(U, energy) - paid[n, DIMENSIONS] / part)
+
+
+@driver
+def pay_drag(
+    begin, end, rows, place, at, velocity, mass, impulse, paid, U, swept, volume, shape, spacing, start, order, lower,
+    size, low, window, strides,
+):  # fmt: skip
+    """The gas of each cell pays the impulse and the work that lone particles in it get, with the first of them: its
+    paid[n] (D + 1,) [N s, J], 0 of the others."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        for d in range(DIMENSIONS + 1):
+            paid[n, d] = 0.0
+        first = -1
+        x = tuple(place[n, d] for d in static_range(DIMENSIONS))
+        reach = tuple(spacing[d] for d in static_range(DIMENSIONS))
+        bx, by, bz = bins_around(x, reach, lower, size, low, window)
+        for k in range(bz[0], bz[1]):
+            for j in range(by[0], by[1]):
+                row = k * strides[2] + j * strides[1]
+                for m in range(start[row + bx[0]], start[row + bx[1]]):
+                    q = order[m]
+                    if at[n] >= 0 and at[q] == at[n]:
+                        first = q if first < 0 else first
+                        for d in static_range(DIMENSIONS):
+                            J = impulse[rows[q], d]
+                            paid[n, d] += J
+                            paid[n, DIMENSIONS] += J * (velocity[rows[q], d] + 0.5 * (J / mass[rows[q]]))
+        if first == n:
+            energy = at[n] + (at[n] // cells * (VARIABLES - 1) + PHASES + DIMENSIONS) * cells
+            pay(U, energy, at[n], cells, load(swept, share_at(at[n], cells)) * volume, paid, n)
+        else:
+            for d in range(DIMENSIONS + 1):
+                paid[n, d] = 0.0
