@@ -517,15 +517,16 @@ def test_a_pocket_that_is_covered_keeps_its_gas():
         content = (case.grid_of(case.fluid.state)[0] * volumes(case))[0, 0]
         return content[int(20 * case.solid.columns["position"].mean()) :].sum()
 
-    mass, covered = before_piston(), 0
+    mass, covered, sealed = before_piston(), 0, []
     while case.simulation.time < 1.5:
         case.step()
         if case.simulation.time > 0.7:
             case.solid.columns["velocity"][:] = -0.5
         covered += case.grid_of(case.coupling.wall.fractions[1].here())[0, 0, 0, -1] == 0.0
+        sealed.append(20 * case.coupling.sealed()[0])
         assert positive(case)
         assert before_piston() == pytest.approx(mass, rel=1e-13)
-    assert covered > 5
+    assert covered > 5 and sealed[0] == sealed[-1] == 0.0 and max(sealed) == pytest.approx(mass, rel=1e-13)
 
 
 @pytest.mark.full

@@ -135,6 +135,16 @@ def put_moved(begin, end, band, moved, U, swept, shape):
 
 
 @driver
+def find_sealed(begin, end, band, held, kind, U, swept, shape):
+    """held (n, PHASES) [kg/m3] = masses per volume of a cell in the band whose fluid is shut in, 0 of the others."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        state, volume = state_at(U, band[n], cells), load(swept, share_at(band[n], cells))
+        for k in static_range(PHASES):
+            held[n, k] = state[k] * volume if kind[band[n]] == SHUT else 0.0
+
+
+@driver
 def look_around(begin, end, band, joined, above, master, offsets, steps, shape, origin, grid_cells):
     """joined (n, offsets) = 1 where the cell at an offset from a cell's master, or from the cell if it has none, has
     joined the same; above (n, D) = the place in the band of the next cell along each axis, -1 for none."""

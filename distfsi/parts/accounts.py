@@ -41,6 +41,7 @@ class Accounts:
             ]
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
+            self.columns += [f"sealed {name}" for name in self.conserved[: self.phases]]
             self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
@@ -83,6 +84,7 @@ class Accounts:
         if self.coupling:
             parts = self.solid.sub_steps
             values |= {"sub-steps": parts, "sub-steps limited by": simulation.name_solid_limit() if parts > 1 else ""}
+            values |= {f"sealed {n}": m for n, m in zip(self.conserved, self.coupling.sealed(), strict=False)}
             for cause, amounts in self.coupling.ledger().items():
                 book(f"ledger {cause}", amounts, -1.0)
         if np.isnan(self._start).all():

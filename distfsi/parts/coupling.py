@@ -244,6 +244,10 @@ class Coupling:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
         return self.kind.here()[:, 0] >= kernels.COVERED
 
+    def sealed(self) -> np.ndarray:
+        """Mass [kg] of each phase that is shut in: none."""
+        return np.zeros(self.model.phases)
+
     def memory(self) -> int:
         """Bytes of this rank's fields."""
         return self.kind.nbytes * (1 + self._dimensions * 8)

@@ -58,6 +58,7 @@ FLUID_DRIVERS = (
     kernels.take_contents,
     kernels.mark_leaving,
     kernels.evict,
+    kernels.find_sealed,
     kernels.put_moved,
     kernels.look_around,
     kernels.mix,
@@ -304,6 +305,12 @@ class CutCells:
         self._run(self.kernels.find_pressures, self._area, self._impulse, pressure)
         highest = self._particles.rows.largest(pressure, 0.0) / dt
         return float(self.blocks.communicator.maximum(np.array([highest]))[0])
+
+    def sealed(self) -> np.ndarray:
+        """Collective. Mass [kg] of each phase in cells that are shut: it neither flows nor pushes."""
+        held = self.team.empty((self._band.shape[0], self.model.phases))
+        self._run(self.fluid_kernels.find_sealed, held, self._kinds, self.fluid.there, self._swept, self.wall.shape)
+        return self.blocks.sum(self._cell_volume * self._groups.sums(held))
 
     def let_fluid_leave(self) -> None:
         """All that the fluid holds leaves the domain; from now on no cell has any."""

@@ -139,6 +139,7 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
             coupling.evict()
+            coupling.sealed()
             coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
             coupling.wall.add_balls(gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64))
         simulation.watch()
