@@ -369,10 +369,10 @@ def sum_cells(
                     continue
                 given = tuple(load(kick, at + (b * (DIMENSIONS - 1) + d) * cells) for d in static_range(DIMENSIONS))
                 if dot(given, given) > 0.0:
-                    center = center_of(at, shape, lower, spacing, origin)
-                    dx = tuple(center[d] - x[d] for d in static_range(DIMENSIONS))
+                    index = (i, j, k)
+                    dx = tuple(lower[d] + (index[d] + 0.5) * spacing[d] - x[d] for d in static_range(DIMENSIONS))
                     if dot(dx, dx) < radius * radius:
-                        index, weight = (i, j, k), immersed_weight(dot(dx, dx), radius)
+                        weight = immersed_weight(dot(dx, dx), radius)
                         for d in static_range(DIMENSIONS):
                             weight = weight * beyond(index[d], grid_cells[d], image[d])
                         total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))

@@ -154,12 +154,12 @@ def look_around(begin, end, band, joined, above, master, offsets, steps, shape, 
         center = at + way_to_master(master, at, cells, steps)
         index, first = index_of(center, shape, origin), center + at // cells * (DIMENSIONS - 1) * cells
         for m in range(len(offsets)):
-            there, same = first + step_to(offsets, m, steps), is_in_domain(index, offsets[m], grid_cells)
+            there, same = first + step_to(offsets, m, steps), True
             for d in static_range(DIMENSIONS):
                 same = same and master[there + d * cells] == -offsets[m, d]
-            joined[n, m] = 1 if same else 0
+            joined[n, m] = 1 if same and is_in_domain(index, offsets[m], grid_cells) else 0
         for axis in range(DIMENSIONS):
-            first, last = n, len(band)
+            first, last = n, min(n + steps[axis] + 1, len(band))
             while last - first > 1:
                 middle = (first + last) // 2
                 if band[middle] <= at + steps[axis]:

@@ -287,7 +287,8 @@ def add_balls(
                 at = corner_at(b, n - 2, j, k, shape)
                 if distance[at] > -largest:
                     x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-                    value = nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides)
+                    wide = min(reach, distance[at] + 1.001 * largest)  # balls beyond are not nearer
+                    value = nearest_ball(x, wide, ball, position, start, order, lower, size, low, window, strides)
                     distance[at] = min(distance[at], off_corner(value, spacing))
 
 

@@ -13,6 +13,7 @@ import platform
 import sys
 import time as clock
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from distfsi.study.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLID_SIZES, S
 REPEATS = 5
 RIPPLE = 1e-4  # relative
 SHEAR_RATE = 10.0  # 1/s
+CALLS_OF_COUPLING = ("time_step", "follow", "before_stage", "after_stage", "impulse", "book_work")
 
 Result = dict[str, float]
 
@@ -99,20 +101,46 @@ def stir(fluid: Fluid) -> None:
     cells[:, : fluid.model.conserved] *= (1.0 + 1e-6 * noise).astype(cells.dtype)
 
 
+@dataclass
+class Stopwatch:
+    """Calls a function and adds up the time it takes [s]."""
+
+    function: Callable
+    seconds: float = 0.0
+
+    def __call__(self, *arguments):
+        started = clock.perf_counter()
+        result = self.function(*arguments)
+        self.seconds += clock.perf_counter() - started
+        return result
+
+
+def time_coupled_step(simulation: Simulation) -> tuple[float, float]:
+    """(wall, step) [s]: what all calls of the coupling take of the next step, and the step itself, on this rank."""
+    coupling = simulation.coupling
+    watches = {name: Stopwatch(getattr(coupling, name)) for name in CALLS_OF_COUPLING}
+    for name, watch in watches.items():
+        setattr(coupling, name, watch)
+    whole = Stopwatch(simulation.step)
+    whole()
+    for name in watches:
+        delattr(coupling, name)
+    return sum(watch.seconds for watch in watches.values()), whole.seconds
+
+
 def time_parts(simulation: Simulation) -> Result:
-    """What each part's kernels take of a step of fluid and solid together, and how many cells are around the wall."""
-    gather, parts = (
-        simulation.communicator.allgather,
-        dict(zip(("fluid", "solid", "wall"), simulation.parts, strict=True)),
-    )
-    before = {name: part.team.seconds for name, part in parts.items()}
-    for _ in range(REPEATS):
-        simulation.step()
-    spent = {name: max(gather(part.team.seconds - before[name])) / REPEATS for name, part in parts.items()}
+    """What the wall takes of a step of fluid and solid together, and of one of both alone; and how many cells are
+    around it. Of the fastest step of several."""
+    gather = simulation.communicator.allgather
+    wall, step = min((time_coupled_step(simulation) for _ in range(REPEATS)), key=lambda times: times[1])
+    cells, band = int(np.prod(simulation.scene.domain.cells)), int(simulation.coupling.workload().sum())
     return {
-        "cells": int(np.prod(simulation.scene.domain.cells)),
-        "band_cells": sum(gather(int(simulation.coupling.workload().sum()))),
-    } | {f"{name}_seconds_per_step": seconds for name, seconds in spent.items()}
+        "cells": cells,
+        "band_cells": sum(gather(band)),
+        "share_of_band": sum(gather(band)) / cells,
+        "wall_seconds_per_step": max(gather(wall)),
+        "wall_beside_both_alone": max(gather(wall / (step - wall))),
+    }
 
 
 def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
@@ -139,7 +167,9 @@ def bench_solid(work: Scene, communicator: Communicator, threads: int | None, se
     simulation = start(work, communicator, threads)
     particles = sum(communicator.allgather(len(simulation.solid.columns["id"])))
     first, step = time_loop(simulation, seconds)
-    coupled = time_parts(simulation) if work.fluid else {}
+    if simulation.coupling:
+        stir(simulation.fluid)
+    coupled = time_parts(simulation) if simulation.coupling else {}
     return coupled | {
         "particles": particles,
         "particle_steps_per_second": particles / step,

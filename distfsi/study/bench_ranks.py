@@ -9,33 +9,17 @@ from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
 from distfsi.parts.fluid import Fluid
 from distfsi.scene.description import Scene
-from distfsi.study.bench import start, stir
+from distfsi.study.bench import Stopwatch, start, stir
 from distfsi.study.works import FLUIDS
 
 WORK = "shock_bubble_2d"
 STEPS, REPEATS = 5, 5
-
-
-@dataclass
-class Stopwatch:
-    """Calls a function and adds up the time it takes [s]."""
-
-    function: Callable
-    seconds: float = 0.0
-
-    def __call__(self, *arguments):
-        started = clock.perf_counter()
-        result = self.function(*arguments)
-        self.seconds += clock.perf_counter() - started
-        return result
 
 
 def time_steps(simulation) -> dict[str, float]:

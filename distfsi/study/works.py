@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,6 +50,18 @@ def blast_on_copper(cells: int, dimensions: int, thickness: float | None = None)
     cube = _cube((0.75 * cells,) + (0.375 * cells,) * (D - 1), (thickness or side,) + (side,) * (D - 1))
     domain = scene.Domain(blast.domain.lower, blast.domain.upper, blast.domain.cells, (("outflow", "outflow"),) * D)
     return _endless(domain, blast.fluid, cube)
+
+
+def blast_on_plates(cells: int, dimensions: int, side: float, count: int, pitch: float) -> scene.Scene:
+    """The same with `count` plates of two cells, so wide and a `pitch` apart [cells], one behind the other."""
+    one = blast_on_copper(cells, dimensions, 2.0)
+    low, across = 0.75 * cells, (0.5 * (cells - side),) * (dimensions - 1)
+    plates = [
+        replace(body, name=f"plate {n}")
+        for n in range(count)
+        for body in _cube((low + n * pitch, *across), (2.0,) + (side,) * (dimensions - 1)).bodies
+    ]
+    return replace(one, solid=replace(one.solid, bodies=tuple(plates)))
 
 
 def bursting_ball() -> scene.Scene:
@@ -113,7 +126,10 @@ COUPLED = {
     "blast_on_copper_3d": lambda: blast_on_copper(48, 3),
     "blast_on_plate_2d": lambda: blast_on_copper(256, 2, 2.0),
     "blast_on_plate_3d": lambda: blast_on_copper(48, 3, 2.0),
+    "blast_on_plates_2d": lambda: blast_on_plates(256, 2, 64.0, 8, 7.0),
+    "blast_on_plates_3d": lambda: blast_on_plates(48, 3, 16.0, 2, 6.0),
 }
+"""Of the last two's cells about 5 % are around walls."""
 SMALLEST = {
     "fluid": lambda: gases((8, 8), *TWO_GASES),
     "solid": lambda: copper(8, 2),
