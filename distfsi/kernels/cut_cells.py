@@ -5,12 +5,12 @@ is whole, so that both are the same. `swept` (blocks, SWEPT, Z, Y, X) holds v an
 phase energies. Cells are named as in kernels/coupling.py.
 """
 
-from distfsi.device.markers import driver, helper, load, store, workspace
+from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.kernels.coupling import FLUID
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening, step_to
 from distfsi.physics.moving_wall import state_of, with_energies
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
+from distfsi.physics.symbols import DIMENSIONS, LANES, PHASES, VARIABLES
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
 SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
@@ -169,28 +169,54 @@ def look_around(begin, end, band, joined, above, master, offsets, steps, shape, 
             above[n, axis] = first if band[first] == at + steps[axis] else -1
 
 
+@row
+def states_row(Q, S, n):
+    """S = states of the n contents Q, behind which their volumes stand; values of a cell are LANES apart."""
+    for i in range(n):
+        content = tuple(load(Q, v * LANES + i) for v in static_range(VARIABLES + 2))
+        state = state_of(content, load(Q, (VARIABLES + 2) * LANES + i))
+        for v in static_range(VARIABLES):
+            store(S, v * LANES + i, state[v])
+
+
+@helper
+def repeat_lane(Q, values, n):
+    """Lanes n … LANES of so many values hold what the first does."""
+    for v in range(values):
+        for i in range(n, LANES):
+            store(Q, v * LANES + i, load(Q, v * LANES))
+
+
 @driver
 def mix(begin, end, band, joined, mixed, U, swept, fraction, master, offsets, steps, shape):
-    """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs."""
+    """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs. An
+    item is a box of LANES cells."""
     cells = shape[0] * shape[1] * shape[2]
-    total = workspace(VARIABLES + 4)
-    for n in range(begin, end):
-        at = band[n]
-        center = at + way_to_master(master, at, cells, steps)
-        for v in range(VARIABLES + 4):
-            total[v] = 0.0
-        add_content(total, U, swept, fraction, center, cells)
-        shares = center != at
-        for m in range(len(offsets)):
-            if joined[n, m] > 0:
-                shares = True
-                add_content(total, U, swept, fraction, center + step_to(offsets, m, steps), cells)
-        volume = max(total[VARIABLES + 2], SEALED)
-        Q = tuple(total[v] for v in static_range(VARIABLES + 2))
-        state = state_of(Q, volume)
-        for v in static_range(VARIABLES):
-            mixed[n, v] = state[v]
-        mixed[n, VARIABLES] = volume * (load(fraction, at) / total[VARIABLES + 3] if shares else 1.0)
+    total, Q, S = workspace(VARIABLES + 4), workspace((VARIABLES + 3) * LANES), workspace(VARIABLES * LANES)
+    for box in range(begin, end):
+        lanes = min(LANES, len(band) - box * LANES)
+        for i in range(lanes):
+            n = box * LANES + i
+            at = band[n]
+            center = at + way_to_master(master, at, cells, steps)
+            for v in range(VARIABLES + 4):
+                total[v] = 0.0
+            add_content(total, U, swept, fraction, center, cells)
+            shares = center != at
+            for m in range(len(offsets)):
+                if joined[n, m] > 0:
+                    shares = True
+                    add_content(total, U, swept, fraction, center + step_to(offsets, m, steps), cells)
+            total[VARIABLES + 2] = max(total[VARIABLES + 2], SEALED)
+            for v in range(VARIABLES + 3):
+                store(Q, v * LANES + i, total[v])
+            part = load(fraction, at) / total[VARIABLES + 3] if shares else 1.0
+            mixed[n, VARIABLES] = total[VARIABLES + 2] * part
+        repeat_lane(Q, VARIABLES + 3, lanes)
+        states_row(Q, S, LANES)
+        for i in range(lanes):
+            for v in range(VARIABLES):
+                mixed[box * LANES + i, v] = load(S, v * LANES + i)
 
 
 @driver

@@ -436,7 +436,8 @@ class CutCells:
         """Contents of the band become states of what belongs together; covered cells rest."""
         self._exchange_contents(U)
         wall, k, mixed = self.wall, self.fluid_kernels, self._mixed(self._band)
-        self._run(k.mix, self._joined, mixed, U, self._swept, fraction, *self._company)
+        boxes = -(-self._band.shape[0] // self.team.lanes)
+        self.team.run(k.mix, boxes, self._band, self._joined, mixed, U, self._swept, fraction, *self._company)
         self._run(k.put_mixed, mixed, U, self._swept, wall.shape)
         rest = (self._covered, U, self._swept, self._rest_there, wall.shape)
         self.team.run(k.put_rest, self._covered.shape[0], *rest)
