@@ -3,9 +3,9 @@
 Faces are computed LANES at a time, so that a CPU does them side by side; all quantities of those are LANES apart.
 """
 
-from distfsi.device.markers import driver, helper, load, real, store, workspace
+from distfsi.device.markers import driver, helper, load, real, row, store, workspace
 from distfsi.kernels.coupling import BOX, FLUID, LINE, flux_of_face, look_at_face
-from distfsi.kernels.cut_cells import put_content, share_at, state_at
+from distfsi.kernels.cut_cells import put_content, repeat_lane, share_at, state_at
 from distfsi.kernels.cut_geometry import opening
 from distfsi.kernels.fluid import face_fluxes, place, primitives_row, rises_row
 from distfsi.physics.moving_wall import normal_of, stage_content, wall_pressure
@@ -143,52 +143,94 @@ def find_fluxes(begin, end, band, faces, seen, flux, U, shape, steps, rates):
             first += n
 
 
+@helper
+def add_fluxes(D, n, at, above, flux, kind, old, new, steps, rates, cells):
+    """D (FLUXES,) = dt times the divergence of the fluxes of find_fluxes() in the cell number n of the band."""
+    for v in range(FLUXES):
+        D[v] = 0.0
+    for axis in range(DIMENSIONS):
+        step = steps[axis]
+        for side in range(2):
+            between = open_between(kind, old, new, at + side * step, axis, step, cells)
+            if between > 0.0:
+                rate = (2 * side - 1) * rates[axis] * between
+                shared = side == 1 and above[n, axis] >= 0
+                m, first = (above[n, axis] if shared else n), (2 * axis + (0 if shared else side)) * FLUXES
+                for v in range(FLUXES):
+                    D[v] += rate * flux[m, first + v]
+
+
+@row
+def content_row(S, Q, b, dt, n):
+    """Q = contents after a stage of the n cells whose states before the step and now, volumes then and now, part that
+    the wall has freed, and divergence stand in S; values of a cell are LANES apart."""
+    for i in range(n):
+        content = stage_content(
+            tuple(load(S, v * LANES + i) for v in static_range(VARIABLES)),
+            tuple(load(S, (VARIABLES + v) * LANES + i) for v in static_range(VARIABLES)),
+            load(S, 2 * VARIABLES * LANES + i),
+            load(S, (2 * VARIABLES + 1) * LANES + i),
+            tuple(load(S, (2 * VARIABLES + 3 + v) * LANES + i) for v in static_range(FLUXES)),
+            load(S, (2 * VARIABLES + 2) * LANES + i),
+            b,
+            dt,
+        )
+        for v in static_range(VARIABLES):
+            store(Q, v * LANES + i, content[v])
+        if PHASES == 2:
+            store(Q, VARIABLES * LANES + i, content[VARIABLES])
+            store(Q, (VARIABLES + 1) * LANES + i, content[VARIABLES + 1])
+
+
 @driver
 def advance_band(
     begin, end, band, above, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new,
     shape, steps, rates, b, dt, weight,
 ):  # fmt: skip
-    """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents.
+    """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents. An item is a
+    box of LANES cells.
 
     start_volume (n,): of the fluid before the step. area, velocity (n, D): of the wall; impulse (n, D) [N s/m3] and
     work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
     """
     cells = shape[0] * shape[1] * shape[2]
-    D = workspace(FLUXES)
-    for n in range(begin, end):
-        at = band[n]
-        for v in range(FLUXES):
-            D[v] = 0.0
-        for axis in range(DIMENSIONS):
-            step = steps[axis]
-            for side in range(2):
-                between = open_between(kind, old, new, at + side * step, axis, step, cells)
-                if between > 0.0:
-                    rate = (2 * side - 1) * rates[axis] * between
-                    shared = side == 1 and above[n, axis] >= 0
-                    m, first = (above[n, axis] if shared else n), (2 * axis + (0 if shared else side)) * FLUXES
-                    for v in range(FLUXES):
-                        D[v] += rate * flux[m, first + v]
-        now = state_at(U, at, cells)
-        surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
-        wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
-        size, normal = normal_of(surface)
-        freed = dt * dot(surface, wall)
-        if size > 0.0:
-            W = primitives(now)
-            relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
-            p = wall_pressure(now, W, dot(relative, normal))
-            for d in static_range(DIMENSIONS):
-                D[PHASES + d] += dt * p * surface[d]
-                impulse[n, d] += weight * p * surface[d]
-            D[PHASES + DIMENSIONS] += freed * p
-            work[n] += weight * p * dot(surface, wall)
-        share = share_at(at, cells)
-        volume, start = load(swept, share), start_volume[n]
-        divergence = tuple(D[v] for v in static_range(FLUXES))
-        content = stage_content(state_at(U_n, at, cells), now, start, volume, divergence, freed, b, dt)
-        put_content(U_new, swept, at, cells, content)
-        store(swept, share, start + b * (volume + freed - start))
+    D, S, Q = workspace(FLUXES), workspace((2 * VARIABLES + 3 + FLUXES) * LANES), workspace((VARIABLES + 2) * LANES)
+    for box in range(begin, end):
+        first = box * LANES
+        lanes = min(LANES, len(band) - first)
+        for i in range(lanes):
+            n, at = first + i, band[first + i]
+            add_fluxes(D, n, at, above, flux, kind, old, new, steps, rates, cells)
+            now, before = state_at(U, at, cells), state_at(U_n, at, cells)
+            surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
+            wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
+            size, normal = normal_of(surface)
+            freed = dt * dot(surface, wall)
+            if size > 0.0:
+                W = primitives(now)
+                relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
+                p = wall_pressure(now, W, dot(relative, normal))
+                for d in static_range(DIMENSIONS):
+                    D[PHASES + d] += dt * p * surface[d]
+                    impulse[n, d] += weight * p * surface[d]
+                D[PHASES + DIMENSIONS] += freed * p
+                work[n] += weight * p * dot(surface, wall)
+            share = share_at(at, cells)
+            volume, start = load(swept, share), start_volume[n]
+            for v in static_range(VARIABLES):
+                store(S, v * LANES + i, before[v])
+                store(S, (VARIABLES + v) * LANES + i, now[v])
+            store(S, 2 * VARIABLES * LANES + i, start)
+            store(S, (2 * VARIABLES + 1) * LANES + i, volume)
+            store(S, (2 * VARIABLES + 2) * LANES + i, freed)
+            for v in range(FLUXES):
+                store(S, (2 * VARIABLES + 3 + v) * LANES + i, D[v])
+            store(swept, share, start + b * (volume + freed - start))
+        repeat_lane(S, 2 * VARIABLES + 3 + FLUXES, lanes)
+        content_row(S, Q, b, dt, LANES)
+        for i in range(lanes):
+            content = tuple(load(Q, v * LANES + i) for v in static_range(VARIABLES + 2))
+            put_content(U_new, swept, band[first + i], cells, content)
 
 
 @driver

@@ -224,7 +224,7 @@ class CutCells:
         boxes = -(-self._faces.shape[0] // self.team.lanes)
         given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
         self.team.run(self.fluid_kernels.find_fluxes, boxes, *given)
-        self._run(
+        self._run_boxes(
             self.fluid_kernels.advance_band, self._above, self._flux, self._start, self._input, self._output,
             self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
             stage.b, dt, weight,
@@ -436,8 +436,7 @@ class CutCells:
         """Contents of the band become states of what belongs together; covered cells rest."""
         self._exchange_contents(U)
         wall, k, mixed = self.wall, self.fluid_kernels, self._mixed(self._band)
-        boxes = -(-self._band.shape[0] // self.team.lanes)
-        self.team.run(k.mix, boxes, self._band, self._joined, mixed, U, self._swept, fraction, *self._company)
+        self._run_boxes(k.mix, self._joined, mixed, U, self._swept, fraction, *self._company)
         self._run(k.put_mixed, mixed, U, self._swept, wall.shape)
         rest = (self._covered, U, self._swept, self._rest_there, wall.shape)
         self.team.run(k.put_rest, self._covered.shape[0], *rest)
@@ -448,6 +447,10 @@ class CutCells:
 
     def _run(self, kernel: Any, *arguments: Any) -> None:
         self.team.run(kernel, self._band.shape[0], self._band, *arguments)
+
+    def _run_boxes(self, kernel: Any, *arguments: Any) -> None:
+        """`_run`, of a kernel whose items are boxes of the device's lanes."""
+        self.team.run(kernel, -(-self._band.shape[0] // self.team.lanes), self._band, *arguments)
 
     @property
     def _swept(self) -> Any:
