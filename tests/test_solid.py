@@ -101,14 +101,13 @@ def test_a_spinning_body_keeps_turning(dimensions, spacing, steps, share):
     assert np.hypot(*part.columns["position"].T[:2]).max() < 0.52
 
 
-def clumped(dimensions, spacing, steps, share):
-    """How far [spacings] particles go, pushed by 1 cm/s at random, in a lattice with fixed sides that a mean strain of
-    5 % pulls; and by how much its energy grows, over that of this motion."""
-    tension = 0.05
+def clumped(dimensions, spacing, steps, tension, share):
+    """How far [spacings] particles go, pushed by 1 cm/s at random, in a lattice with fixed sides under the mean strain
+    `tension`, without viscosity; and by how much its energy grows, over that of this motion."""
     box = body(
         Box((-0.5,) * dimensions, (0.5,) * dimensions), spacing, 1000.0, (0.0,) * dimensions, SOFT_EOS, Elastic(0.7e9)
     )
-    part = solid([box], (-1.0,) * dimensions, (1.0,) * dimensions, artificial_stress=share)
+    part = solid([box], (-1.0,) * dimensions, (1.0,) * dimensions, viscosity=(0.0, 0.0), artificial_stress=share)
     c = part.columns
     start = c["position"].copy()
     c["fixed"] = (np.abs(start) > 0.5 - 2.7 * spacing).any(axis=1)
@@ -121,11 +120,11 @@ def clumped(dimensions, spacing, steps, share):
     return np.abs(part.columns["position"] - start).max() / spacing, (energy(part) - before) / kinetic
 
 
-@pytest.mark.parametrize(("dimensions", "spacing", "steps"), [(2, 0.05, 300), (3, 0.1, 250)])
-def test_artificial_stress_keeps_a_stretched_lattice_from_clumping(dimensions, spacing, steps):
-    (free, _), (held, gained) = (clumped(dimensions, spacing, steps, share) for share in (0.0, 0.3))
+@pytest.mark.parametrize(("dimensions", "spacing", "steps", "tension"), [(2, 0.05, 200, 0.02), (3, 0.1, 150, 0.05)])
+def test_artificial_stress_keeps_a_stretched_lattice_from_clumping(dimensions, spacing, steps, tension):
+    (free, _), (held, gained) = (clumped(dimensions, spacing, steps, tension, share) for share in (0.0, 0.3))
     assert held < 1e-3
-    assert free > (100.0 if dimensions == 2 else 8.0) * held
+    assert free > 100.0 * held
     assert abs(gained) < 1e-8  # of a motion that is a tiny part of the energy
 
 

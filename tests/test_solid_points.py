@@ -67,8 +67,8 @@ def test_pair_forces_are_opposite_to_the_bit_and_energy_balances(dimensions):
     S_i, S_j = random.normal(size=(2, dimensions, dimensions))
     dv, distance2, slope = v_i - v_j, float(dx @ dx), -0.8
     seen = -0.1, -0.3
-    approach = kernels.approach_speeds(tuple(dv), tuple(dx), seen, distance2, 1.0)
-    assert approach == kernels.approach_speeds(tuple(-dv), tuple(-dx), seen[::-1], distance2, 1.0)
+    approach = kernels.approach_speeds(tuple(dv), tuple(dx), seen, -0.5, distance2, 1.0)
+    assert approach == kernels.approach_speeds(tuple(-dv), tuple(-dx), seen[::-1], -0.5, distance2, 1.0)
     Pi = kernels.viscosity(0.3, 0.2, 2.0, 1.1)
     assert Pi == pytest.approx((2.0 * 0.2 + 2.0 * 0.3**2) / 1.1)
     a_i = np.array(kernels.pair_acceleration(tuple(dx), slope, as_rows(S_i + S_j), 1.3, Pi))
@@ -83,9 +83,10 @@ def test_viscosity_and_pressure_push_apart_and_heat():
     kernels = compiled(2, pair.approach_speeds, pair.pair_acceleration, pair.pair_heating)
     dx, nearing, nothing, pressure = (0.5, 0.0), (-1.0, 0.0), np.zeros((2, 2)), -np.eye(2)
     unseen, smooth = (0.0, 0.0), (-0.5, -0.5)
-    assert kernels.approach_speeds(nearing, dx, unseen, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.5 / 0.26))
-    assert kernels.approach_speeds(nearing, dx, smooth, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.0))
-    assert kernels.approach_speeds((1.0, 0.0), dx, unseen, 0.25, 1.0) == (0.0, 0.0)
+    assert kernels.approach_speeds(nearing, dx, unseen, 0.0, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.5 / 0.26))
+    assert kernels.approach_speeds((1.0, 0.0), dx, unseen, 0.0, 0.25, 1.0) == (0.0, 0.0)
+    for dilation in (0.0, -4.0):  # shear, and a plane wave
+        assert kernels.approach_speeds(nearing, dx, smooth, dilation, 0.25, 1.0) == pytest.approx((0.5 / 0.26, 0.0))
     for stress, Pi in ((pressure, 0.0), (nothing, 1.0)):
         assert kernels.pair_acceleration(dx, -1.0, as_rows(stress), 1.0, Pi)[0] > 0.0
         assert kernels.pair_heating(nearing, dx, -1.0, as_rows(stress), 1.0, Pi) > 0.0

@@ -23,7 +23,7 @@ from distfsi.physics.pair import (
 from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import ARTIFICIAL_STRESS, COMPONENTS, DIMENSIONS
-from distfsi.physics.tensors import components, dot, positive_part, product, rows, times
+from distfsi.physics.tensors import components, dot, positive_part, product, rows, times, trace
 
 MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
 
@@ -145,8 +145,9 @@ def pair_geometry(position, state, rates, i, j):
     dx = difference(position, 0, i, j)
     distance2 = dot(dx, dx)
     h = 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING])
-    seen = (along(matrix_of(rates, i), dx), along(matrix_of(rates, j), dx))
-    approach, rough = approach_speeds(difference(state, VELOCITY, i, j), dx, seen, distance2, h)
+    own, other = matrix_of(rates, i), matrix_of(rates, j)
+    seen, dilation = (along(own, dx), along(other, dx)), trace(own) + trace(other)
+    approach, rough = approach_speeds(difference(state, VELOCITY, i, j), dx, seen, dilation, distance2, h)
     mean_sound = 0.5 * (state[i, SOUND_SPEED] + state[j, SOUND_SPEED])
     mean_density = 0.5 * (state[i, DENSITY] + state[j, DENSITY])
     return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, rough, mean_sound, mean_density))

@@ -13,24 +13,30 @@ from distfsi.physics.symbols import ARTIFICIAL_STRESS, DIMENSIONS, SMOOTHING_RAT
 from distfsi.physics.tensors import dot, identity_plus, inverse, least_eigenvalue, product, rows, times
 
 
-def approach_speeds(dv, dx, seen, distance2, h):
-    """-phi of Eq. 6 [m/s] if the particles approach each other, else 0; and the same without what both have `seen`.
+def approach_speeds(dv, dx, seen, dilation, distance2, h):
+    """-phi of Eq. 6 [m/s] if the particles approach each other, else 0; and the jump of velocity between them.
 
-    `seen`: dx . (grad v) dx of either particle [m2/s]. Where both are compressions, their harmonic mean is the jump of
-    velocity of a smooth flow, limited as van Leer's slopes are (after Frontiere, Raskin & Owen, J. Comput. Phys. 332,
-    2017); only the rest is damped. Shocks and waves between the particles are not seen.
+    `seen`: dx . (grad v) dx of either particle [m2/s], `dilation`: the sum of both div v [1/s]. What the two see alike
+    is smooth, limited as van Leer's slopes are (after Frontiere, Raskin & Owen, J. Comput. Phys. 332, 2017); the rest
+    is a jump. Where the flow changes volumes, as in shocks, they must be more alike, jumps apart count as well, and all
+    by half as much again: else velocities swing behind weak shocks. Plastic flow keeps volumes; it is not damped so.
     """
-    own, other = min(seen[0], 0.0), min(seen[1], 0.0)
-    smooth = 2.0 * own * other / min(own + other, -1e-300)
-    per_length = h / (distance2 + 0.01 * h * h)
+    total = seen[0] + seen[1]
+    alike = max(4.0 * seen[0] * seen[1] / max(total * total, 1e-300), 0.0)
+    volumetric = min(abs(dilation) * distance2 / max(abs(total), 1e-300), 1.0)
+    limited = 0.5 * total * alike * (1.0 - volumetric * (1.0 - alike * alike * alike))
     whole = dot(dv, dx)
-    return (max(-whole * per_length, 0.0), max((smooth - whole) * per_length, 0.0))
+    smooth = max(min(limited, max(whole, 0.0)), min(whole, 0.0))
+    per_length = h / (distance2 + 0.01 * h * h)
+    jump = (smooth - whole) * per_length
+    rough = (1.0 + 0.5 * volumetric) * (max(jump, 0.0) + volumetric * min(jump, 0.0))
+    return (max(-whole * per_length, 0.0), rough)
 
 
 def viscosity(approach, rough, sound_speed, density):
     """Monaghan's Pi [m5/(kg s2)] of an approach speed at the mean sound speed and density (Eq. 6).
 
-    Its linear part damps what is `rough` of the approach.
+    Its linear part damps what is `rough`.
     """
     return (VISCOSITY_ALPHA * sound_speed * rough + VISCOSITY_BETA * approach * approach) / density
 
