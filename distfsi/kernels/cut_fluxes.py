@@ -37,20 +37,22 @@ def see_wall(kind, old, new, at, cells, step, axis, T):
 
 
 @driver
-def find_walls(begin, end, band, area, kind, old, new, shape, steps, spacing):
-    """area (n, D) [1/m] = the wall's area per volume of the cell, along its normal into the solid; it closes what the
-    open faces leave open."""
+def find_walls(begin, end, band, area, opened, kind, old, new, shape, steps, spacing):
+    """opened (n, 2 D) = the open parts of a cell's faces, low and high along each axis; area (n, D) [1/m] = the wall's
+    area per volume of the cell, along its normal into the solid: it closes what these leave open."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
         for axis in range(DIMENSIONS):
             step = steps[axis]
             low = open_between(kind, old, new, band[n], axis, step, cells)
             high = open_between(kind, old, new, band[n] + step, axis, step, cells)
+            opened[n, 2 * axis] = low
+            opened[n, 2 * axis + 1] = high
             area[n, axis] = (low - high) / spacing[axis]
 
 
 @driver
-def find_faces(begin, end, band, above, seen, kind, old, new, shape, steps):
+def find_faces(begin, end, band, above, opened, seen, kind, old, new, shape, steps):
     """seen (D, n, 2) = 1 for open faces of the band's cells, else 0: the low one along each axis, and the high one
     unless the cell `above` (n, D) it is in the band too; more where it stops the slopes of the cell before
     (STOPS_LOW) or behind (STOPS_HIGH)."""
@@ -59,11 +61,9 @@ def find_faces(begin, end, band, above, seen, kind, old, new, shape, steps):
         for axis in range(DIMENSIONS):
             step = steps[axis]
             for side in range(2):
-                low = band[n] + (side - 1) * step
-                face = 0
-                if (side == 0 or above[n, axis] < 0) and open_between(
-                    kind, old, new, low + step, axis, step, cells
-                ) > 0.0:
+                face, own = 0, side == 0 or above[n, axis] < 0
+                if own and opened[n, 2 * axis + side] > 0.0:
+                    low = band[n] + (side - 1) * step
                     before = open_between(kind, old, new, low, axis, step, cells) > 0.0
                     behind = open_between(kind, old, new, low + 2 * step, axis, step, cells) > 0.0
                     face = 1 + (0 if before else STOPS_LOW) + (0 if behind else STOPS_HIGH)
@@ -144,14 +144,13 @@ def find_fluxes(begin, end, band, faces, seen, flux, U, shape, steps, rates):
 
 
 @helper
-def add_fluxes(D, n, at, above, flux, kind, old, new, steps, rates, cells):
+def add_fluxes(D, n, above, opened, flux, rates):
     """D (FLUXES,) = dt times the divergence of the fluxes of find_fluxes() in the cell number n of the band."""
     for v in range(FLUXES):
         D[v] = 0.0
     for axis in range(DIMENSIONS):
-        step = steps[axis]
         for side in range(2):
-            between = open_between(kind, old, new, at + side * step, axis, step, cells)
+            between = opened[n, 2 * axis + side]
             if between > 0.0:
                 rate = (2 * side - 1) * rates[axis] * between
                 shared = side == 1 and above[n, axis] >= 0
@@ -184,8 +183,8 @@ def content_row(S, Q, b, dt, n):
 
 @driver
 def advance_band(
-    begin, end, band, above, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, kind, old, new,
-    shape, steps, rates, b, dt, weight,
+    begin, end, band, above, opened, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, shape,
+    rates, b, dt, weight,
 ):  # fmt: skip
     """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents. An item is a
     box of LANES cells.
@@ -200,7 +199,7 @@ def advance_band(
         lanes = min(LANES, len(band) - first)
         for i in range(lanes):
             n, at = first + i, band[first + i]
-            add_fluxes(D, n, at, above, flux, kind, old, new, steps, rates, cells)
+            add_fluxes(D, n, above, opened, flux, rates)
             now, before = state_at(U, at, cells), state_at(U_n, at, cells)
             surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
             wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))

@@ -199,9 +199,9 @@ class CutCells:
         self._area, self._velocity = (team.empty((n, D)) for _ in range(2))
         self._inertia, self._start_volume = (team.empty(n) for _ in range(2))
         self._impulse, self._work = team.zeros((n, D)), team.zeros(n)
-        self._run(self.fluid_kernels.find_walls, self._area, *self._walls, self.wall.spacing)
-        self._seen = team.empty(2 * D * n, np.int8)
-        self._run(self.fluid_kernels.find_faces, self._above, self._seen, *self._walls)
+        self._opened, self._seen = team.empty((n, 2 * D)), team.empty(2 * D * n, np.int8)
+        self._run(self.fluid_kernels.find_walls, self._area, self._opened, *self._walls, self.wall.spacing)
+        self._run(self.fluid_kernels.find_faces, self._above, self._opened, self._seen, *self._walls)
         self._faces = self._particles.rows.marked(self._seen)[1]
         self._flux = team.empty((n, 2 * D * self.model.constants["FLUXES"]))
         self._see(self._particle_velocity, self._velocity)
@@ -225,9 +225,9 @@ class CutCells:
         given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
         self.team.run(self.fluid_kernels.find_fluxes, boxes, *given)
         self._run_boxes(
-            self.fluid_kernels.advance_band, self._above, self._flux, self._start, self._input, self._output,
-            self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work, *self._walls, rates,
-            stage.b, dt, weight,
+            self.fluid_kernels.advance_band, self._above, self._opened, self._flux, self._start, self._input,
+            self._output, self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work,
+            self.wall.shape, rates, stage.b, dt, weight,
         )  # fmt: skip
         self.team.run(
             self.fluid_kernels.book_sides, self._near_sides.shape[0], self._near_sides, *self._sides,
