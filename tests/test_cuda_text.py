@@ -97,6 +97,7 @@ def steps_side_by_side(monkeypatch, path, steps, overrides=()):
     simulation = Simulation.of(load(path, overrides), Communicator(), 1)
     for _ in range(steps):
         simulation.step()
+    simulation.coupling.sealed()
     assert not pair.unlike
     return pair.calls
 
