@@ -22,8 +22,9 @@ def approach_speeds(dv, dx, seen, dilation, distance2, h):
     by half as much again: else velocities swing behind weak shocks. Plastic flow keeps volumes; it is not damped so.
     """
     total = seen[0] + seen[1]
-    alike = max(4.0 * seen[0] * seen[1] / max(total * total, 1e-300), 0.0)
-    volumetric = min(abs(dilation) * distance2 / max(abs(total), 1e-300), 1.0)
+    per_total = 1.0 / max(abs(total), 1e-300)
+    alike = max(4.0 * (seen[0] * per_total) * (seen[1] * per_total), 0.0)
+    volumetric = min(abs(dilation) * distance2 * per_total, 1.0)
     limited = 0.5 * total * alike * (1.0 - volumetric * (1.0 - alike * alike * alike))
     whole = dot(dv, dx)
     smooth = max(min(limited, max(whole, 0.0)), min(whole, 0.0))
