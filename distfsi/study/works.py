@@ -127,7 +127,7 @@ COUPLED = {
     "blast_on_plate_2d": lambda: blast_on_copper(256, 2, 2.0),
     "blast_on_plate_3d": lambda: blast_on_copper(48, 3, 2.0),
     "blast_on_plates_2d": lambda: blast_on_plates(256, 2, 64.0, 8, 7.0),
-    "blast_on_plates_3d": lambda: blast_on_plates(48, 3, 16.0, 2, 6.0),
+    "blast_on_plates_3d": lambda: blast_on_plates(48, 3, 18.0, 2, 6.0),
 }
 """Of the last two's cells about 5 % are around walls."""
 SMALLEST = {
