@@ -195,8 +195,11 @@ def press(begin, end, pressure, pushed):
 
 
 @driver
-def accelerate(begin, end, position, state, neighbours, neighbour_count, rates, stress, acceleration, limits):
-    """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow."""
+def accelerate(
+    begin, end, position, state, neighbours, neighbour_count, rates, stress, acceleration, limits, viscous
+):  # fmt: skip
+    """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow;
+    viscous[i] = Pi of each pair."""
     for i in range(begin, end):
         total = tuple(0.0 for _ in static_range(DIMENSIONS))
         fastest = 0.0
@@ -204,6 +207,7 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, rates, 
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
             dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
+            viscous[i, n] = Pi
             densities = state[i, DENSITY] * state[j, DENSITY]
             if ARTIFICIAL_STRESS:
                 Pi += repelling(state, i, j, dx, plus(tension_of(stress, i), tension_of(stress, j)))
@@ -220,7 +224,8 @@ def accelerate(begin, end, position, state, neighbours, neighbour_count, rates, 
 
 @driver
 def heat(
-    begin, end, position, state, neighbours, neighbour_count, rates, dt, stress, correction, velocity, energy, gradient
+    begin, end, position, state, neighbours, neighbour_count, viscous, dt, stress, correction, velocity, energy,
+    gradient,
 ):  # fmt: skip
     """Advance the energy (Eq. 5c) and find the velocity gradient; `velocity` is the new one, of all particles.
 
@@ -232,7 +237,8 @@ def heat(
         own = matrix_of(stress, i)
         for n in range(neighbour_count[i]):
             j = neighbours[i, n]
-            dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
+            dx, Pi = difference(position, 0, i, j), viscous[i, n]
+            slope = smoothing_slope(dot(dx, dx), 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING]))
             before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
             mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
             densities = state[i, DENSITY] * state[j, DENSITY]

@@ -27,6 +27,7 @@ class UpdatedLagrangian:
         """`repels`: the kernels hold an artificial stress."""
         self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
         self._repels = repels
+        self._viscous = device.empty((0, 0))  # kept, as fresh memory costs more than what is put into it
 
     def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
         """Add the column."""
@@ -71,8 +72,9 @@ class UpdatedLagrangian:
         self._correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
         run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
         (self._stress,) = near.plan.exchange([(stress, near.matrix + tension)])
-        self._rates = rates
-        run(self._kernels.accelerate, own, *self._pairs, rates, self._stress, acceleration, limits)
+        if self._viscous.shape != self._search.table.shape:
+            self._viscous = self._device.empty(self._search.table.shape)
+        run(self._kernels.accelerate, own, *self._pairs, rates, self._stress, acceleration, limits, self._viscous)
 
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance the energy by `dt` [s] with the old and the new `velocity` (count, D), and write the velocity
@@ -82,5 +84,5 @@ class UpdatedLagrangian:
 
     def strain_debris(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """As strain(), after push_debris()."""
-        given = (self._rates, dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
+        given = (self._viscous, dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
         self._device.run(self._kernels.heat, near.own, *self._pairs, *given)
