@@ -19,7 +19,9 @@ from distfsi.physics.bonds import (
     largest_stretch,
     least_stretch,
     most_stretched,
+    shocked_share,
     signal_time,
+    unseen_share,
     whole_step,
     zero_energy_stiffness,
 )
@@ -363,7 +365,7 @@ def pull(begin, end, bond_count, partner, bond, tension, volume, mass, accelerat
 @driver
 def stretch(
     begin, end, dt, bond_count, partner, bond, tension, motion, volume, mass, correction, h, density, sound,
-    deformation, energy, viscous, gradient, loose
+    around, deformation, energy, viscous, gradient, loose
 ):  # fmt: skip
     """Advance energy and deformation gradient by `dt`; gradient[i] = the velocity gradient of the step.
 
@@ -375,21 +377,25 @@ def stretch(
     for i in range(begin, end):
         if bond_count[i] > 0:
             own, kappa = stress_of(tension, i), tension[i, STIFFNESS]
-            power, total = 0.0, no_matrix()
+            power, moved, relative2 = 0.0, no_matrix(), 0.0
             for n in range(bond_count[i]):
-                j = partner[i, n]
-                pulled, spring = times_bond(own, bond, i, n), kappa * bond_weight(bond, i, n)
+                j, w = partner[i, n], bond_weight(bond, i, n)
+                pulled, spring = times_bond(own, bond, i, n), kappa * w
                 u, mean = difference(tension, DISPLACEMENT, j, i), difference(motion, 0, j, i)
                 power += sum((pulled[d] + spring * u[d]) * mean[d] for d in static_range(DIMENSIONS))
-                total = plus(total, outer(difference(motion, DIMENSIONS, j, i), bond_vector(bond, i, n)))
+                dv = difference(motion, DIMENSIONS, j, i)
+                moved = plus(moved, outer(dv, bond_vector(bond, i, n)))
+                relative2 += w * dot(dv, dv)
             energy[i] += dt * volume[i] / mass[i] * power
-            before = matrix_of(deformation, i)
-            after = plus(before, product(scaled(dt, total), matrix_of(correction, i)))
+            before, fitted = matrix_of(deformation, i), product(moved, matrix_of(correction, i))
+            after = plus(before, scaled(dt, fitted))
             if determinant(after) > LEAST_GROWTH * determinant(before):
                 rates = whole_step(before, after, dt)
                 store_matrix(deformation, i, after)
                 store_matrix(gradient, i, rates)
-                viscous[i] = bulk_viscosity(trace(rates), density[i], h[i], sound[i])
+                unseen, shocked = unseen_share(fitted, moved, relative2), shocked_share(trace(rates), h[i], sound[i])
+                share = shocked if FAILS and around[i] > 0.0 else unseen
+                viscous[i] = bulk_viscosity(trace(rates), density[i], h[i], sound[i], share)
             else:
                 loose[i] = 1
 

@@ -300,7 +300,7 @@ class TotalLagrangian:
             self._debris.strain_debris(c, near, dt, velocity, gradient)
         motion = self._device.empty((near.plan.count, 2 * self._dimensions))
         self._run(near.plan.count, "mean_motion", near.state, velocity, motion)
-        material = c.read("volume", "mass", "correction", "h", "density", "sound_speed")
+        material = c.read("volume", "mass", "correction", "h", "density", "sound_speed", "around")
         changed = c.write("deformation", "energy", "viscous_pressure")
         given = (*material, *changed, gradient, *c.write("loose"))
         self._run(near.own, "stretch", dt, *self._bonds(c), self._tensions, motion, *given)

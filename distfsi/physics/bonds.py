@@ -18,7 +18,8 @@ from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, pr
 SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
 SHORTEST = 1e-300  # s: steps of no length strain nothing
 LEAST_GROWTH = 0.1  # of the volume in a step that can be taken
-SHOCKED = 30.0  # jumps of velocity to the sound speed, above which viscosity has its linear part in full
+ROUGH = 5.0  # over the share of the velocities that is unseen, above which viscosity has its linear part in full
+SHOCKED = 30.0  # jumps of velocity to the sound speed, above which it does at cracks and contacts
 
 
 def whole_step(before, after, dt):
@@ -51,15 +52,30 @@ def whole_step(before, after, dt):
     )
 
 
-def bulk_viscosity(divergence, density, size, sound_speed):
-    """Viscous pressure [Pa] of a compression: quadratic in the jump of velocity over a particle's `size` [m].
+def unseen_share(rates, moved, relative2):
+    """How much of its linear viscosity a particle has, 0 to 1: by the share of its partners' motion that is not linear.
 
-    The linear part is that of an acoustic Riemann solver, limited to jumps that are not small beside the sound speed:
-    bending and plastic flow are not damped.
+    `relative2` is the sum of w (v_j - v_i)^2 and `moved` that of (v_j - v_i) g, for which `rates` is the fit of least
+    squares; what the fit accounts for is rates : moved.
     """
-    jump = max(-size * divergence, 0.0)
-    linear = 0.5 * VISCOSITY_ALPHA * min(SHOCKED * jump, sound_speed)
-    return density * jump * (linear + VISCOSITY_BETA * jump)
+    seen = sum(sum(rates[a][b] * moved[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
+    return min(ROUGH * max(1.0 - seen / max(relative2, SHORTEST), 0.0), 1.0)
+
+
+def shocked_share(divergence, size, sound_speed):
+    """The same by the jump of velocity, where what no linear field accounts for is a crack or a contact."""
+    return min(SHOCKED * max(-size * divergence, 0.0) / sound_speed, 1.0)
+
+
+def bulk_viscosity(divergence, density, size, sound_speed, share):
+    """Viscous pressure [Pa], quadratic in the jump of velocity over a particle's `size` [m] in a compression.
+
+    A `share` is left of the linear part, which is that of an acoustic Riemann solver, also in expansions: waves and
+    shocks of any strength are damped where they are not resolved; bending, plastic flow and smooth compression are not.
+    """
+    jump = -size * divergence
+    approach = max(jump, 0.0)
+    return density * (0.5 * VISCOSITY_ALPHA * share * sound_speed * jump + VISCOSITY_BETA * approach * approach)
 
 
 def zero_energy_stiffness(density, sound_speed, plastic_strain, damage, shear_modulus, flow_stress):
@@ -108,7 +124,7 @@ def largest_stretch(deformation):
 
 def signal_time(shortest, sound_speed, viscous_pressure, density):
     """Longest step [s] that signals allow, with safety 0.3; `shortest` [m]: h along the most compressed direction."""
-    signal = sound_speed + viscous_pressure / (density * sound_speed)
+    signal = sound_speed + abs(viscous_pressure) / (density * sound_speed)
     return 0.3 * shortest / signal
 
 

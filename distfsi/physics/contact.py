@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from distfsi.physics.bonds import bulk_viscosity
+from distfsi.physics.bonds import bulk_viscosity, shocked_share
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
@@ -18,7 +18,8 @@ def contact_force(dx, dv, touching, moduli, densities, sound_speeds):
     approach = max(-dot(dv, dx) / distance, 0.0) if overlap > 0.0 else 0.0
     modulus = 2.0 * moduli[0] * moduli[1] / (moduli[0] + moduli[1])
     density, sound_speed = 0.5 * (densities[0] + densities[1]), 0.5 * (sound_speeds[0] + sound_speeds[1])
-    viscous = bulk_viscosity(-approach / touching, density, touching, sound_speed)
+    share = shocked_share(-approach / touching, touching, sound_speed)
+    viscous = bulk_viscosity(-approach / touching, density, touching, sound_speed, share)
     area = 1.0
     if DIMENSIONS == 2:
         area = touching
