@@ -30,7 +30,17 @@ from distfsi.physics.smoothing import smoothing_slope
 from distfsi.physics.solid_eos import free_swelling
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import COMPONENTS, DIMENSIONS, FAILS
-from distfsi.physics.tensors import determinant, dot, identity_plus, least_eigenvalue, product, scaled, times, trace
+from distfsi.physics.tensors import (
+    contraction,
+    determinant,
+    dot,
+    identity_plus,
+    least_eigenvalue,
+    product,
+    scaled,
+    times,
+    trace,
+)
 
 STIFFNESS, DISPLACEMENT = 0, 1  # columns of `tension`; behind them the bond stress
 # Columns of `facts`: what ghosts are told besides.
@@ -376,16 +386,14 @@ def stretch(
     """
     for i in range(begin, end):
         if bond_count[i] > 0:
-            own, kappa = stress_of(tension, i), tension[i, STIFFNESS]
-            power, moved, relative2 = 0.0, no_matrix(), 0.0
+            moved, meant, sprung, relative2 = no_matrix(), no_matrix(), 0.0, 0.0
             for n in range(bond_count[i]):
-                j, w = partner[i, n], bond_weight(bond, i, n)
-                pulled, spring = times_bond(own, bond, i, n), kappa * w
-                u, mean = difference(tension, DISPLACEMENT, j, i), difference(motion, 0, j, i)
-                power += sum((pulled[d] + spring * u[d]) * mean[d] for d in static_range(DIMENSIONS))
-                dv = difference(motion, DIMENSIONS, j, i)
-                moved = plus(moved, outer(dv, bond_vector(bond, i, n)))
+                j, g, w = partner[i, n], bond_vector(bond, i, n), bond_weight(bond, i, n)
+                dv, mean = difference(motion, DIMENSIONS, j, i), difference(motion, 0, j, i)
+                moved, meant = plus(moved, outer(dv, g)), plus(meant, outer(mean, g))
+                sprung += w * dot(difference(tension, DISPLACEMENT, j, i), mean)
                 relative2 += w * dot(dv, dv)
+            power = contraction(stress_of(tension, i), meant) + tension[i, STIFFNESS] * sprung
             energy[i] += dt * volume[i] / mass[i] * power
             before, fitted = matrix_of(deformation, i), product(moved, matrix_of(correction, i))
             after = plus(before, scaled(dt, fitted))

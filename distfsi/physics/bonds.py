@@ -13,7 +13,18 @@ from math import log, sqrt
 
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, VISCOSITY_ALPHA, VISCOSITY_BETA, ZERO_ENERGY
-from distfsi.physics.tensors import determinant, dot, identity_plus, inverse, product, rows, scaled, trace, transposed
+from distfsi.physics.tensors import (
+    contraction,
+    determinant,
+    dot,
+    identity_plus,
+    inverse,
+    product,
+    rows,
+    scaled,
+    trace,
+    transposed,
+)
 
 SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
 SHORTEST = 1e-300  # s: steps of no length strain nothing
@@ -58,8 +69,7 @@ def unseen_share(rates, moved, relative2):
     `relative2` is the sum of w (v_j - v_i)^2 and `moved` that of (v_j - v_i) g, for which `rates` is the fit of least
     squares; what the fit accounts for is rates : moved.
     """
-    seen = sum(sum(rates[a][b] * moved[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
-    return min(ROUGH * max(1.0 - seen / max(relative2, SHORTEST), 0.0), 1.0)
+    return min(ROUGH * max(1.0 - contraction(rates, moved) / max(relative2, SHORTEST), 0.0), 1.0)
 
 
 def shocked_share(divergence, size, sound_speed):

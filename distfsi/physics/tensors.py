@@ -39,6 +39,11 @@ def trace(matrix):
     return sum(matrix[a][a] for a in static_range(DIMENSIONS))
 
 
+def contraction(first, second):
+    """first : second."""
+    return sum(dot(first[a], second[a]) for a in static_range(DIMENSIONS))
+
+
 def scaled(factor, matrix):
     """`factor` times a matrix."""
     return tuple(tuple(factor * matrix[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
