@@ -8,9 +8,12 @@ import pytest
 from distfsi.device import cpu
 from distfsi.device.markers import driver
 from distfsi.kernels.fluid import HALVINGS
+from distfsi.mesh.communicator import Communicator
 from distfsi.physics.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
+from distfsi.scene import load
+from distfsi.simulation import Simulation
 from fluids import MATERIALS, PAIRS, TRACE, model_of
 
 EXTENDED = np.longdouble
@@ -258,3 +261,42 @@ def test_compiled_stage_leaves_a_uniform_state_to_the_bit(pair, b):
     new = np.empty_like(U)
     kernels(pair).stage_at_rest(U, new, b)
     assert np.array_equal(U, new)
+
+
+# ---- cells painted with two materials --------------------------------------------------------------------------------
+
+CHARGE = """
+[domain]
+lower = [0]
+upper = [1]
+cells = [10]
+[time]
+end = 1
+[fluid.phases]
+products = {eos = "jwl", rho0 = 1630, A = "371.2 GPa", B = "3.21 GPa", R1 = 4.15, R2 = 0.95, omega = 0.3}
+air = {eos = "ideal_gas", gamma = 1.4}
+[[fluid.regions]]
+phase = "air"
+density = 1.225
+pressure = "1 atm"
+[[fluid.regions]]
+phase = "products"
+density = 1630
+energy = "4.29 MJ/kg"
+shape = {kind = "box", lower = [0], upper = [0.55]}
+"""
+
+
+@pytest.mark.parametrize("end", [0.5001, 0.53, 0.55, 0.599])
+def test_a_cell_that_a_charge_covers_in_part_starts_at_one_pressure(tmp_path, end):
+    """The sums of both stay; either has given or taken the work of the common pressure."""
+    (tmp_path / "charge.toml").write_text(CHARGE.replace("0.55", str(end)))
+    fluid = Simulation.of(load(tmp_path / "charge.toml"), Communicator(), threads=1).fluid
+    cells, part = fluid.cells(0)[:, 0, 0], (end - 0.5) / 0.1
+    inside, cut, outside = (cells[:, i].astype(float) for i in (2, 5, 8))
+    assert cut[:-1] == pytest.approx(part * inside[:-1] + (1.0 - part) * outside[:-1], rel=1e-12)
+    products, air, _, pressure, _ = fluid.model.formula("primitives")(cut)
+    eos, air_before = fluid.model.eos[0], 101325.0 / 0.4 / 1.225
+    energy = (pressure - eos.evaluate(products)[0]) / (eos.omega * products)
+    assert energy - 4.29e6 == pytest.approx(pressure * (1.0 / 1630.0 - 1.0 / products), rel=1e-5)
+    assert pressure / (0.4 * air) - air_before == pytest.approx(pressure * (1.0 / 1.225 - 1.0 / air), rel=1e-5)

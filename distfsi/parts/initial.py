@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from distfsi.device.emit import plain
+from distfsi.kernels.fluid import HALVINGS
 from distfsi.mesh.blocks import Blocks
+from distfsi.physics import moving_wall, relaxation
 from distfsi.scene.description import Fluid, FluidState
 from distfsi.scene.shapes import cell_fractions, contains
+
+ALIKE = 1e-9  # part by which pressures differ that are one
 
 
 class InitialState:
@@ -20,7 +25,13 @@ class InitialState:
 
     def __init__(self, fluid: Fluid, model):
         self.fluid, self.model = fluid, model
-        self._conserved = model.formula("conserved")
+        self._conserved, self._primitives = (model.formula(name) for name in ("conserved", "primitives"))
+        if model.phases == 2:
+            formulas = (moving_wall.phase_energies, relaxation.phases_before, relaxation.relaxed_fraction_change)
+            self._energies, self._before, self._change, self._range, self._halved = (
+                plain(formula, model.constants, model.bindings)
+                for formula in (*formulas, relaxation.range_of_change, relaxation.halved_range)
+            )
 
     def of(self, state: FluidState) -> np.ndarray:
         """Conserved state (variables,) of a region or an inflow."""
@@ -30,7 +41,7 @@ class InitialState:
 
     def paint(self, blocks: Blocks, field: np.ndarray) -> None:
         """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part
-        holds that part of the region's mass, momentum, energy and volume."""
+        holds that part of the region's mass, momentum and energy; two materials have come to one pressure in it."""
         dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
@@ -43,7 +54,37 @@ class InitialState:
                     cells[:] = new
                     continue
                 part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
-                cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, part * new + (1.0 - part) * cells))
+                mixed = part * new + (1.0 - part) * cells
+                if self.model.phases == 2:
+                    for at in zip(*np.nonzero((part > 0.0) & (part < 1.0)), strict=True):
+                        mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
+                cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
+
+    def _mixed(self, new: np.ndarray, old: np.ndarray, part: float) -> np.ndarray:
+        """State (variables,) of a cell of which a `part` holds one state and the rest another. At one pressure and the
+        density of its region, a material that came from a high pressure would be colder than cold."""
+        states, shares, D = (new, old), np.array((part, 1.0 - part)), self.model.dimensions
+        primitives = [self._primitives(U) for U in states]
+        lowest, highest = sorted(W[2 + D] for W in primitives)
+        U = shares @ np.array(states)
+        if highest - lowest <= ALIKE * abs(lowest):
+            return U
+        energies = shares @ np.array([self._energies(W) for W in primitives])
+        fractions = (U[-1], 1.0 - U[-1])
+        references = [eos.evaluate(m / a)[0] for eos, m, a in zip(self.model.eos, U, fractions, strict=False)]
+        excess = [
+            eos.omega * energy - a * (lowest - reference)
+            for eos, energy, a, reference in zip(self.model.eos, energies, fractions, references, strict=True)
+        ]
+        phases = self._before(lowest, U[-1], 0.0, U[0], U[1], *references, *excess)
+        change, settled = self._change(phases)
+        if settled < 0.0:
+            low, high = self._range(U[-1])
+            for _ in range(HALVINGS):
+                low, high = self._halved(phases, low, high)
+            change = 0.5 * (low + high)
+        U[-1] += change
+        return U
 
     def at(self, positions: np.ndarray) -> np.ndarray:
         """States (variables, n) at points (n, D) [m]."""
