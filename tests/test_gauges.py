@@ -203,7 +203,7 @@ SOD_GAUGES = (
 @pytest.mark.parametrize(("scene", "steps"), [("sod", 30), ("tube", 12)])
 def test_a_restart_continues_the_files(tmp_path, scene, steps):
     """What was written after the restart is dropped and written again: the same bytes as without any restart."""
-    words = {"sod": (SOD, SOD_GAUGES), "tube": (TUBE, [*GAUGES, *COARSE, *FIELDS])}[scene]
+    words = {"sod": (SOD, SOD_GAUGES), "tube": (TUBE, [*GAUGES, *COARSE, "time.end=3 us", *FIELDS])}[scene]
     scenes = [load(words[0], [*words[1], f'output.directory="{tmp_path / name}"']) for name in ("whole", "stopped")]
     whole, stopped = (Simulation.of(scene, Communicator(), threads=1) for scene in scenes)
     advance(whole, 2 * steps)
