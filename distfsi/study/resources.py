@@ -21,7 +21,10 @@ from distfsi.study.works import SMOOTHING
 PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
 PICTURE_BYTES = 25e6  # of the maps of a fluid in the summary
 COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
-PARTICLE_BYTES = {1: 900.0, 2: 1060.0, 3: 1280.0}  # at the peak within a step, by dimensions
+PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
+    "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 6600.0},
+    "updated_lagrangian": {1: 900.0, 2: 1250.0, 3: 2800.0},
+}
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
 PARTICLE_FILE_BYTES = 2 * VECTOR + 6 * FLOAT + 10 * FLOAT  # two vectors, stress, scalars, topology
 SECONDS_TO_LOAD = 0.25  # what a process needs once, whatever it runs
@@ -105,7 +108,8 @@ class Resources:
 
     def arrays(self) -> float:
         """Cells and particles of the rank that takes most."""
-        particles = PARTICLE_BYTES[self.dimensions] * self.particles_of_ranks
+        solid = self.scene.solid
+        particles = (PARTICLE_BYTES[solid.form][self.dimensions] if solid else 0.0) * self.particles_of_ranks
         return max(self.field_bytes(blocks) + p for blocks, p in zip(self.blocks, particles, strict=True))
 
     def field_bytes(self, blocks: Blocks) -> float:
