@@ -204,7 +204,7 @@ def advance_band(
             surface = tuple(area[n, d] for d in static_range(DIMENSIONS))
             wall = tuple(velocity[n, d] for d in static_range(DIMENSIONS))
             size, normal = normal_of(surface)
-            freed = dt * dot(surface, wall)
+            freed = real(dt * dot(surface, wall))  # the same to the bit in volume and content
             if size > 0.0:
                 W = primitives(now)
                 relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
