@@ -93,19 +93,14 @@ class ChosenGhosts:
 
     def _transfer(self, given: list[tuple[Any, Any]], stride: int) -> Any:
         """The rows of the ghosts, packed, on the device."""
-        device, route, column, real = self._device, self._route, 0, given[0][0].dtype
-        leaving, arriving = (device.message_memory(n * stride, real) for n in (route.leaving, route.arriving))
-        there, arrived = device.beneath(leaving), device.beneath(arriving)
-        with device.beside():
+        device, route = self._device, self._route
+
+        def pack(there: Any) -> None:
+            column = 0
             for flat, parity in given:
                 place = (*self._out.columns, parity, self._cells, flat, stride, column, there)
                 device.run(self._kernels.pack_cells, route.leaving, *place)
                 column += parity.shape[0]
-            device.take(leaving, there)
-        device.finish_beside()
-        route.transfer(leaving, arriving, stride)
-        with device.beside():
-            device.put(arrived, arriving)
-        device.join()
-        self._staged = arriving  # the device may still read it
+
+        arrived, self._staged = route.carry(device, stride, given[0][0].dtype, pack)  # the device may still read it
         return arrived

@@ -276,19 +276,13 @@ class GhostPlan:
         exchange, device, route = self._exchange, self._exchange.device, self._route
         if not route.leaving and not route.arriving:
             return device.empty(0)
-        leaving, arriving = (device.message_memory(n * stride, np.float64) for n in (route.leaving, route.arriving))
-        there, arrived = device.beneath(leaving), device.beneath(arriving)
-        with device.beside():
+
+        def pack(there: Any) -> None:
             for array, width, column in zip(arrays, widths, columns, strict=True):
                 row = (self._rows, int(width), array.reshape(-1), stride, int(column), there)
                 device.run(exchange.kernels.pack_rows, route.leaving, *row)
-            device.take(leaving, there)
-        device.finish_beside()
-        route.transfer(leaving, arriving, stride)
-        with device.beside():
-            device.put(arrived, arriving)
-        device.join()
-        exchange.staged = arriving
+
+        arrived, exchange.staged = route.carry(device, stride, np.dtype(np.float64), pack)
         return arrived
 
     def _extended(self, array: Any, parity: Parity, width: int, stride: int, column: int, packed: Any) -> Any:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from distfsi.device.seam import Device
 from distfsi.mesh.communicator import Communicator
 
 
@@ -39,6 +41,21 @@ class Route:
         requests = [self._world.Irecv(part, rank) for rank, part in parts(arrived, self._arriving)]
         requests += [self._world.Isend(part, rank) for rank, part in parts(rows, self._leaving)]
         MPI.Request.Waitall(requests)
+
+    def carry(self, device: Device, width: int, real: np.dtype, pack: Callable[[Any], None]) -> tuple[Any, Any]:
+        """As transfer(), from and to the memory of a device: pack(rows) writes there the flat rows, of so many values
+        each, that leave. Returns those that arrive, on the device, and the memory that it may still read them from."""
+        leaving, arriving = (device.message_memory(n * width, real) for n in (self.leaving, self.arriving))
+        there, arrived = device.beneath(leaving), device.beneath(arriving)
+        with device.beside():
+            pack(there)
+            device.take(leaving, there)
+        device.finish_beside()
+        self.transfer(leaving, arriving, width)
+        with device.beside():
+            device.put(arrived, arriving)
+        device.join()
+        return arrived, arriving
 
     @staticmethod
     def _parts(rows: Any, slices: list[tuple[int, int, int]], width: int) -> list[tuple[int, Any]]:

@@ -56,22 +56,29 @@ class InitialState:
                 part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
                 mixed = part * new + (1.0 - part) * cells
                 if self.model.phases == 2:
-                    for at in zip(*np.nonzero((part > 0.0) & (part < 1.0)), strict=True):
+                    cut = np.argwhere((part > 0.0) & (part < 1.0))
+                    alike = self._alike(state[:, None], cells[:, *cut.T])
+                    for at in map(tuple, cut[~alike]):
                         mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
                 cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
+
+    def _pressure(self, U: np.ndarray) -> np.ndarray:
+        return self._primitives(U)[self.model.phases + self.model.dimensions]
+
+    def _alike(self, new: np.ndarray, old: np.ndarray) -> np.ndarray:
+        """Where two states have one pressure."""
+        pressure, other = self._pressure(new), self._pressure(old)
+        return np.abs(pressure - other) <= ALIKE * np.abs(other)
 
     def _mixed(self, new: np.ndarray, old: np.ndarray, part: float) -> np.ndarray:
         """State (variables,) of a cell of which a `part` holds one state and the rest another. At one pressure and the
         density of its region, a material that came from a high pressure would be colder than cold."""
-        states, shares, D = (new, old), np.array((part, 1.0 - part)), self.model.dimensions
+        states, shares = (new, old), np.array((part, 1.0 - part))
         primitives = [self._primitives(U) for U in states]
-        lowest, highest = sorted(W[2 + D] for W in primitives)
-        U = shares @ np.array(states)
-        if highest - lowest <= ALIKE * abs(lowest):
-            return U
+        lowest, U = min(self._pressure(state) for state in states), shares @ np.array(states)
         energies = shares @ np.array([self._energies(W) for W in primitives])
         fractions = (U[-1], 1.0 - U[-1])
-        references = [eos.evaluate(m / a)[0] for eos, m, a in zip(self.model.eos, U, fractions, strict=False)]
+        references = [eos.evaluate(m / a)[0] for eos, m, a in zip(self.model.eos, U[:2], fractions, strict=True)]
         excess = [
             eos.omega * energy - a * (lowest - reference)
             for eos, energy, a, reference in zip(self.model.eos, energies, fractions, references, strict=True)
