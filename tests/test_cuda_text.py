@@ -12,7 +12,9 @@ from distfsi.kernels import (
     cut_geometry,
     dust,
     images,
+    push,
     solid,
+    wall_distance,
 )
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
@@ -25,7 +27,8 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 FAILING = ("crack", "cut", "look_around", "mark_damaged")
 NOT_REACHED = (*FAILING, "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
 FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
-SCHEMES = {"paper": (coupling,), "cut_cells": (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images)}
+CUT_CELLS = (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images, push, wall_distance)
+SCHEMES = {"paper": (coupling, push), "cut_cells": CUT_CELLS}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
 OF_OTHER_SCHEMES["stairs"] = {"evict", "put_moved", "cover_evicted"}  # no cell is small before it is shut

@@ -1,5 +1,8 @@
-"""Loops that list the band, all cells that read one that is not whole, the covered cells, and the loose ones: whole
-cells that the wall has left, in which the volume that their fluid has swept is not quite theirs.
+"""Loops that list the band, the covered cells, and the loose ones: whole cells that the wall has left, in which the
+volume that their fluid has swept is not quite theirs.
+
+The band are all cells that are not whole or next to one that is not, and those whose neighbours' slopes a cell without
+a fluid stops: two cells away, as the faces of whole cells are open. So the stage has the same fluxes around all others.
 
 An item is a row of cells along x. Rows are numbered as they lie in memory, ghosts included; cells are named as in
 kernels/coupling.py.
@@ -14,28 +17,32 @@ from distfsi.physics.symbols import DIMENSIONS
 # What a cell is to the coupling; the ghosts of all but the first must be known to it.
 FAR, BAND, BEHIND, LOOSE = range(4)
 
+OPEN, WHOLE = 1, 2
+
 NEAR_WHOLE = 0.25  # of a cell: the fluid's stage advances open cells whose swept volume is not farther off
 
 
 @row
 def whole_row(whole, kind, fraction_old, fraction_new, swept, at, share, n):
-    """whole[at …] = 1 where a cell is like any other of the fluid, throughout the step."""
+    """whole[at …] = WHOLE where a cell is like any other of the fluid, throughout the step; OPEN where it holds fluid
+    that flows, else 0."""
     for i in range(n):
         old, new, volume = load(fraction_old, at + i), load(fraction_new, at + i), load(swept, share + i)
         fluid, near = load(kind, at + i) == FLUID, abs(volume - 1.0) <= NEAR_WHOLE
-        store(whole, at + i, 1 if (old == 1.0) & (new == 1.0) & near & fluid else 0)
+        part = WHOLE if (old == 1.0) & (new == 1.0) & near else OPEN
+        store(whole, at + i, part if fluid else 0)
 
 
 @row
-def join_row(plain, whole, at, step, n):
-    """plain[at …] becomes 0 where the cell `step` away is not whole."""
+def join_row(plain, whole, at, step, least, n):
+    """plain[at …] becomes 0 where the cell `step` away is less than `least`."""
     for i in range(n):
-        store(plain, at + i, load(plain, at + i) & load(whole, at + step + i))
+        store(plain, at + i, load(plain, at + i) if load(whole, at + step + i) >= least else 0)
 
 
 @driver
 def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept, fields, shape):
-    """whole = 1 where a cell is like any other of the fluid, in `near` blocks. swept (blocks, fields, Z, Y, X)."""
+    """whole = what each cell of `near` blocks is to its neighbours' stage. swept (blocks, fields, Z, Y, X)."""
     cells = shape[0] * shape[1] * shape[2]
     for r in range(begin, end):
         b = r // (shape[0] * shape[1])
@@ -48,7 +55,7 @@ def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept,
 def find_band(begin, end, near, plain, mark, whole, kind, swept, fields, offsets, steps, shape, extent, counts):
     """mark = what each cell of `near` blocks is; counts (rows, 3) = cells in the band, covered and loose ones.
 
-    plain becomes 1 where all that the fluid's stage reads for a cell is whole.
+    plain becomes WHOLE where the fluid's stage has the fluxes of a cell right, else 0.
     """
     cells = shape[0] * shape[1] * shape[2]
     for r in range(begin, end):
@@ -57,11 +64,12 @@ def find_band(begin, end, near, plain, mark, whole, kind, swept, fields, offsets
         if n > 0:
             for i in range(n):
                 store(plain, at + i, load(whole, at + i))
+            join_row(plain, whole, at, 0, WHOLE, n)
             for m in range(len(offsets)):
-                join_row(plain, whole, at, step_to(offsets, m, steps), n)
+                join_row(plain, whole, at, step_to(offsets, m, steps), WHOLE, n)
             for d in static_range(DIMENSIONS):
-                join_row(plain, whole, at, -2 * steps[d], n)
-                join_row(plain, whole, at, 2 * steps[d], n)
+                join_row(plain, whole, at, -2 * steps[d], OPEN, n)
+                join_row(plain, whole, at, 2 * steps[d], OPEN, n)
         share = at + b * (fields - 1) * cells
         band, covered, loose = 0, 0, 0
         for i in range(n):

@@ -11,10 +11,9 @@ from distfsi.device.markers import driver, helper, load, real, store, workspace
 from distfsi.kernels.fluid import face_fluxes, place, primitives_row, rises_row
 from distfsi.kernels.gather import any_particle, sum_particles
 from distfsi.kernels.solid import DENSITY, MASS, VELOCITY
-from distfsi.physics.immersed import immersed_weight, impulse_on_wall, moving_with
+from distfsi.physics.immersed import impulse_on_wall, moving_with
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, FLUXES, LOOKS_SIDEWAYS, PHASES, VARIABLES, conserved, primitives
-from distfsi.physics.tensors import dot
 
 # What a cell is: fluid; fluid since this step; not yet looked at; behind the wall; farther behind than fluxes look.
 FLUID, FRESH, UNKNOWN, COVERED, DEEP = range(5)
@@ -321,14 +320,6 @@ def spread(begin, end, covered, passed, velocity, inertia, kick, shape):
 
 
 @helper
-def cells_within(x, radius, lower, spacing, first, end):
-    """First and past-the-end cell along one axis whose centers are within `radius` of x, inside first … end."""
-    low = int(floor((x - radius - lower) / spacing + 0.5))
-    high = int(floor((x + radius - lower) / spacing - 0.5))
-    return (max(low, first), min(high + 1, end))
-
-
-@helper
 def three(position, p):
     """Coordinates of a particle; an unused axis has one cell, from 0 to 1."""
     return (position[p, 0], position[p, 1] if DIMENSIONS > 1 else 0.5, position[p, 2] if DIMENSIONS > 2 else 0.5)
@@ -342,60 +333,3 @@ def home_of(x, lower, spacing, grid_cells, block_cells, curve_index):
         for d in static_range(3)
     )
     return curve_index[own[0], own[1], own[2]]
-
-
-@helper
-def beyond(index, cells, weight):
-    """1 for a cell of the grid, `weight` for an image beyond its end."""
-    return weight if index < 0 or index >= cells else 1.0
-
-
-@helper
-def sum_cells(
-    x, b, radius, image, kind, giver, kick, shape, lower, spacing, origin, extent, seen_cells, grid_cells
-):  # fmt: skip
-    """Sum of kernel * kick over the cells around x, of the kind `giver`, in the memory of block b; images along each
-    axis count by `image` (D,)."""
-    cells = shape[0] * shape[1] * shape[2]
-    first = tuple(max(origin[b, d] - 2, seen_cells[d, 0]) for d in static_range(3))
-    end = tuple(min(origin[b, d] + extent[b, d] + 2, seen_cells[d, 1]) for d in static_range(3))
-    ix, iy, iz = tuple(cells_within(x[d], radius, lower[d], spacing[d], first[d], end[d]) for d in static_range(3))
-    total = tuple(0.0 for _ in static_range(DIMENSIONS))
-    for k in range(iz[0], iz[1]):
-        for j in range(iy[0], iy[1]):
-            for i in range(ix[0], ix[1]):
-                at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
-                if kind[at] != giver:
-                    continue
-                given = tuple(load(kick, at + (b * (DIMENSIONS - 1) + d) * cells) for d in static_range(DIMENSIONS))
-                if dot(given, given) > 0.0:
-                    index = (i, j, k)
-                    dx = tuple(lower[d] + (index[d] + 0.5) * spacing[d] - x[d] for d in static_range(DIMENSIONS))
-                    if dot(dx, dx) < radius * radius:
-                        weight = immersed_weight(dot(dx, dx), radius)
-                        for d in static_range(DIMENSIONS):
-                            weight = weight * beyond(index[d], grid_cells[d], image[d])
-                        total = tuple(total[d] + weight * given[d] for d in static_range(DIMENSIONS))
-    return total
-
-
-@driver
-def push(
-    begin, end, start, position, mass, image, impulse, home, radius, kind, giver, kick, shape, lower, spacing, origin,
-    extent, seen_cells, grid_cells, block_cells, curve_index, first_block,
-):  # fmt: skip
-    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle, none but
-    those of the kind `giver` having any; home[p] = the local block that it was in at the `start` of the step.
-
-    seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes; image (n, D): how
-    much these count for a particle, along each axis.
-    """
-    for p in range(begin, end):
-        part = tuple(image[p, d] for d in static_range(DIMENSIONS))
-        home[p] = home_of(three(start, p), lower, spacing, grid_cells, block_cells, curve_index) - first_block
-        total = sum_cells(
-            three(position, p), home[p], radius, part, kind, giver, kick, shape, lower, spacing, origin, extent,
-            seen_cells, grid_cells,
-        )  # fmt: skip
-        for d in static_range(DIMENSIONS):
-            impulse[p, d] = mass[p] * total[d]

@@ -278,11 +278,11 @@ def exchange_volumes(
         at = uneven[n]
         volume = load(swept, share_at(at, cells))
         state = state_at(U, at, cells)
-        for v in static_range(VARIABLES):
-            total[v] = volume * state[v]
         gained = 0.0
         mine = surplus(kind, swept, fraction, at, cells)
         if mine != 0.0:
+            for v in static_range(VARIABLES):
+                total[v] = volume * state[v]
             sign = 1.0 if mine > 0.0 else -1.0
             index = index_of(at, shape, origin)
             around = opposite(kind, swept, fraction, old, new, at, sign, cells, steps, index, grid_cells)

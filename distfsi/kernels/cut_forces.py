@@ -12,9 +12,9 @@ from distfsi.kernels.coupling import center_of
 from distfsi.kernels.cut_cells import share_at, way_to_master
 from distfsi.kernels.cut_geometry import step_to
 from distfsi.kernels.dust import DUST, WALL
-from distfsi.kernels.gather import sum_particles
+from distfsi.kernels.gather import are_near, put_place, sum_around_all
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES
+from distfsi.physics.symbols import DIMENSIONS, LANES, PHASES, VARIABLES
 from distfsi.physics.tensors import dot
 
 
@@ -65,11 +65,13 @@ def mark_stretched(begin, end, cell, farthest, volume, bond_count, deformation, 
 
 
 @driver
-def find_middle(begin, end, start, position, middle):
-    """middle[i] of the way of a particle in a step."""
+def find_middle(begin, end, start, position, middle, way):
+    """middle[i] (D,) of a particle's way in a step, and how far along an axis it goes, way[i]."""
     for i in range(begin, end):
+        way[i] = 0.0
         for d in static_range(DIMENSIONS):
             middle[i, d] = 0.5 * (start[i, d] + position[i, d])
+            way[i] = max(way[i], abs(position[i, d] - start[i, d]))
 
 
 @driver
@@ -99,26 +101,50 @@ def has_wall(area, n):
 
 
 @driver
-def see_particles(
-    begin, end, band, area, mean, inertia, radius, momentum, position, start, order, lower, size, low, window, strides,
-    shape, spacing, origin,
-):  # fmt: skip
-    """mean (n, D) [m/s] of the particles' velocities, by mass times kernel, in the band's cells with a wall.
-
-    momentum (particles, 1 + D): mass and mass times velocity; inertia (n,) = sum of mass times kernel.
-    """
-    sums = workspace(1 + DIMENSIONS)
+def mark_walled(begin, end, band, area, mark):
+    """mark[n] = 1 where the wall passes through a cell of the band, else 0."""
     for n in range(begin, end):
-        inertia[n] = 0.0
-        for d in static_range(DIMENSIONS):
-            mean[n, d] = 0.0
-        if has_wall(area, n):
-            x = center_of(band[n], shape, lower, spacing, origin)
-            sum_particles(sums, x, radius, momentum, position, start, order, lower, size, low, window, strides)
-            inertia[n] = sums[0]
-            if sums[0] > 0.0:
-                for d in static_range(DIMENSIONS):
-                    mean[n, d] = sums[1 + d] / sums[0]
+        mark[n] = 1 if has_wall(area, n) else 0
+
+
+@helper
+def cells_near(place, band, walled, first, last, radius, shape, lower, spacing, origin):
+    """How many of the cells `walled` (places in the band) from `first` on, before `last`, are computed side by side:
+    their centers are put to `place` (D, LANES), whose remaining points repeat one of them."""
+    x, n = center_of(band[walled[first]], shape, lower, spacing, origin), 1
+    while first + n < last and are_near(x, center_of(band[walled[first + n]], shape, lower, spacing, origin), radius):
+        n += 1
+    for i in range(LANES):
+        put_place(place, i, center_of(band[walled[first + min(i, n - 1)]], shape, lower, spacing, origin))
+    return n
+
+
+@driver
+def see_particles(
+    begin, end, band, walled, mean, inertia, radius, momentum, position, start, order, lower, size, low, window,
+    strides, shape, spacing, origin,
+):  # fmt: skip
+    """mean (n, D) [m/s] of the particles' velocities, by mass times kernel, in the cells `walled` of the band.
+
+    momentum (particles, 1 + D): mass and mass times velocity, flat; inertia (n,) = sum of mass times kernel. An item is
+    a box of LANES cells.
+    """
+    place, around = workspace(DIMENSIONS * LANES), workspace(2 * DIMENSIONS)
+    weight, sums = workspace(LANES), workspace((1 + DIMENSIONS) * LANES)
+    for box in range(begin, end):
+        first, last = box * LANES, min((box + 1) * LANES, len(walled))
+        while first < last:
+            count = cells_near(place, band, walled, first, last, radius, shape, lower, spacing, origin)
+            sum_around_all(
+                sums, weight, around, place, radius, momentum, 1 + DIMENSIONS, position, start, order, lower, size,
+                low, window, strides,
+            )  # fmt: skip
+            for i in range(count):
+                n = walled[first + i]
+                inertia[n] = sums[i]
+                for d in range(DIMENSIONS):
+                    mean[n, d] = sums[(1 + d) * LANES + i] / sums[i] if sums[i] > 0.0 else 0.0
+            first += count
 
 
 @driver

@@ -1,295 +1,25 @@
-"""Loops of the cut cells' geometry: signed distances at the corners of cells, what they leave open of faces and cells,
-and which cells join which.
+"""Loops of the cut cells' geometry: what distances at the corners of cells (kernels/wall_distance.py) leave open of
+faces and cells, and which cells join which.
 
-Particles are smoothed with a kernel; inverting its plane profile turns the sum at a corner into a distance that is
-linear in the positions of the particles. Where a body is thinner than the diagonal of a cell its particles count as
-balls, so that no cell sees both of its sides; these are cut off at edges, so that cracks open.
-
-Cells are named as in kernels/coupling.py. Cells around a block are looked at in its ghosts; corners outside the domain
-are seen in the mirror of its sides.
+Cells are named as in kernels/coupling.py. Cells around a block are looked at in its ghosts.
 """
 
 from math import sqrt
 
-from distfsi.device.markers import driver, helper, load, row, store, workspace
-from distfsi.kernels.contact import side_of_cube
+from distfsi.device.markers import driver, helper, load, row, store
 from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row, row_place
-from distfsi.kernels.gather import any_particle, bins_around, sum_particles
+from distfsi.kernels.wall_distance import CUT, corner_at
 from distfsi.physics.apertures import open_cell, open_face
-from distfsi.physics.immersed import broad_weight
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS
 from distfsi.physics.tensors import dot
 
-NEARBY = 1.2  # kernel radii from where a body is thick to the particles of its corners
-INSIDE, EDGE = 0.04, 0.09  # of a kernel's radius, to the mean of what is around: far from an edge, and at one
-STRETCH = 8  # corners of a row that are left out together where no particle is near
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
 
 SHUT = DEEP  # a cell whose faces are closed, with fluid in it
 
-# What a block is: far from all particles and whole; near particles or else; with cells that are not whole.
-NEAR, CUT = 1, 2
 
-# ---- distances ------------------------------------------------------------------------------------------------------
-
-
-@driver
-def fill_kernel(begin, end, filled, radius, volume, position, start, order, lower, size, low, window, strides):
-    """filled (n, 1 + D) = share of the broad kernel around a particle that particles' `volume` (n, 1) fills, and the
-    mean way [m] from the particle to what fills it."""
-    for p in range(begin, end):
-        x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-        share, moment = 0.0, tuple(0.0 for _ in static_range(DIMENSIONS))
-        bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), lower, size, low, window)
-        for k in range(bz[0], bz[1]):
-            for j in range(by[0], by[1]):
-                row = k * strides[2] + j * strides[1]
-                for n in range(start[row + bx[0]], start[row + bx[1]]):
-                    q = order[n]
-                    way = tuple(position[q, d] - x[d] for d in static_range(DIMENSIONS))
-                    distance2 = dot(way, way)
-                    if distance2 < radius * radius:
-                        part = volume[q, 0] * broad_weight(distance2, radius)
-                        share += part
-                        moment = tuple(moment[d] + part * way[d] for d in static_range(DIMENSIONS))
-        filled[p, 0] = share
-        for d in static_range(DIMENSIONS):
-            filled[p, 1 + d] = moment[d] / max(share, 1e-300)
-
-
-@helper
-def lean_around(lean, p, thick, filled, radius, volume, position, start, order, lower, size, low, window, strides):
-    """The largest share that is filled of the kernels near a particle, and the sum of their weights; lean (D,) = the
-    sum of the ways to what fills them, by weight. Where a share is `thick` no more than that is told."""
-    most, total, around = filled[p, 0], 0.0, NEARBY * radius
-    for d in range(DIMENSIONS):
-        lean[d] = 0.0
-    x = tuple(position[p, d] for d in static_range(DIMENSIONS))
-    bx, by, bz = bins_around(x, tuple(around for _ in static_range(DIMENSIONS)), lower, size, low, window)
-    for k in range(bz[0], bz[1]):
-        for j in range(by[0], by[1]):
-            row = k * strides[2] + j * strides[1]
-            for n in range(start[row + bx[0]], start[row + bx[1]]):
-                q = order[n]
-                dx = tuple(x[d] - position[q, d] for d in static_range(DIMENSIONS))
-                distance2 = dot(dx, dx)
-                if distance2 < around * around:
-                    most = max(most, filled[q, 0])
-                    if most >= thick:
-                        return (most, total)
-                    part = volume[q, 0] * broad_weight(distance2, radius)
-                    total += part
-                    for d in range(DIMENSIONS):
-                        lean[d] += part * filled[q, 1 + d]
-    return (most, total)
-
-
-@driver
-def thicken(
-    begin, end, ball, filled, radius, largest, thin, thick, volume, position, start, order, lower, size, low, window,
-    strides,
-):  # fmt: skip
-    """ball (n, 2 + D) = radius [m] of a particle's ball, how far it goes outwards [m], and where that is.
-
-    The radius is `largest` in a body so thin that no kernel nearby is filled by more than the share `thin`, 0 where one
-    is by `thick`. Outwards is away from what is around, on the mean over the particles around: across a thin body that
-    mean is small, and at its edge it points along it. There the ball ends where the particle's cube does.
-    """
-    lean = workspace(DIMENSIONS)
-    for p in range(begin, end):
-        for d in range(2 + DIMENSIONS):
-            ball[p, d] = 0.0
-        if filled[p, 0] >= thick or volume[p, 0] <= 0.0:
-            continue
-        most, total = lean_around(
-            lean, p, thick, filled, radius, volume, position, start, order, lower, size, low, window, strides
-        )
-        own = largest * min(max((thick - most) / (thick - thin), 0.0), 1.0)
-        if own <= 0.0:
-            continue
-        mean = tuple(lean[d] / total for d in static_range(DIMENSIONS))
-        length = sqrt(dot(mean, mean))
-        cut = min(max((length / radius - INSIDE) / (EDGE - INSIDE), 0.0), 1.0)
-        ball[p, 0] = own
-        ball[p, 1] = own - cut * max(own - 0.5 * side_of_cube(volume[p, 0]), 0.0)
-        for d in static_range(DIMENSIONS):
-            ball[p, 2 + d] = -mean[d] / max(length, 1e-300)
-
-
-@driver
-def mark_balls(begin, end, ball, mark):
-    """mark[p] = 1 where a particle counts as a ball, else 0."""
-    for p in range(begin, end):
-        mark[p] = 1 if ball[p, 0] > 0.0 else 0
-
-
-@helper
-def distance_of(filled, profile, radius):
-    """Distance [m] of a plane wall that fills this share of the kernel; profile: shares on one side of planes."""
-    free = 1.0 - filled
-    if free >= 1.0 or free <= 0.0:
-        return radius if free > 0.0 else -radius
-    first, last = 0, len(profile) - 1
-    while last - first > 1:
-        middle = (first + last) // 2
-        if profile[middle] <= free:
-            first = middle
-        else:
-            last = middle
-    part = min(max((free - profile[first]) / (profile[last] - profile[first]), 0.0), 1.0)
-    return radius * (2.0 * (first + part) / (len(profile) - 1) - 1.0)
-
-
-@helper
-def nearest_ball(x, reach, ball, position, start, order, lower, size, low, window, strides):
-    """Distance [m] of a point to the balls whose centers are within `reach`, or that, if it is less."""
-    nearest = reach
-    bx, by, bz = bins_around(x, tuple(reach for _ in static_range(DIMENSIONS)), lower, size, low, window)
-    for k in range(bz[0], bz[1]):
-        for j in range(by[0], by[1]):
-            row = k * strides[2] + j * strides[1]
-            for n in range(start[row + bx[0]], start[row + bx[1]]):
-                p = order[n]
-                dx = tuple(x[d] - position[p, d] for d in static_range(DIMENSIONS))
-                distance2 = dot(dx, dx)
-                if distance2 < reach * reach:
-                    outwards = tuple(ball[p, 2 + d] for d in static_range(DIMENSIONS))
-                    nearest = min(nearest, max(sqrt(distance2) - ball[p, 0], dot(dx, outwards) - ball[p, 1]))
-    return nearest
-
-
-@helper
-def corner_at(block, i, j, k, shape):
-    """Flat index of the low corner of a cell in a field of corners."""
-    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
-    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
-    return ((block * (shape[0] + uz) + k + gz) * (shape[1] + uy) + j + gy) * (shape[2] + 1) + i + 2
-
-
-@helper
-def mirrored(index, cells):
-    """The plane between cells of which `index` is the image in the sides of the domain."""
-    if index < 0:
-        return -index
-    if index > cells:
-        return 2 * cells - index
-    return index
-
-
-@driver
-def find_near(begin, end, near, search, start, lower, size, low, window, strides, spacing, origin, extent):
-    """near (blocks,) = NEAR where there are particles nearby, or cells that were not whole, else 0."""
-    for b in range(begin, end):
-        middle = tuple(lower[d] + (origin[b, d] + 0.5 * extent[b, d]) * spacing[d] for d in static_range(DIMENSIONS))
-        reach = tuple((0.5 * extent[b, d] + 2.0) * spacing[d] + search for d in static_range(DIMENSIONS))
-        if near[b] > 0 or any_particle(middle, reach, start, lower, size, low, window, strides):
-            near[b] = NEAR
-
-
-@helper
-def corner_place(b, i, j, k, lower, spacing, origin, cells):
-    """Where the low corner of a cell of a block is [m], in the mirror of the domain's sides."""
-    place = (
-        mirrored(origin[b, 0] + i, cells[0]),
-        mirrored(origin[b, 1] + j, cells[1]),
-        mirrored(origin[b, 2] + k, cells[2]),
-    )
-    return tuple(lower[d] + place[d] * spacing[d] for d in static_range(DIMENSIONS))
-
-
-@helper
-def off_corner(distance, spacing):
-    """A distance [m] that does not put the wall onto a corner."""
-    least = 1e-7 * spacing[0]
-    return least if abs(distance) < least else distance
-
-
-@helper
-def corner_row(r, shape):
-    """Block, and places along y and z in it, of a row of corners along x."""
-    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
-    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
-    b = r // ((shape[0] + uz) * (shape[1] + uy))
-    return (b, r % (shape[1] + uy) - gy, r // (shape[1] + uy) % (shape[0] + uz) - gz)
-
-
-@helper
-def corners_of_row(near, b, j, k, extent):
-    """How many corners of a row there are to look at: none in a block that is not `near`, or beyond its cells."""
-    gy, uy = (2, 1) if DIMENSIONS > 1 else (0, 0)
-    gz, uz = (2, 1) if DIMENSIONS > 2 else (0, 0)
-    far = near[b] == 0 or j >= extent[b, 1] + gy + uy or k >= extent[b, 2] + gz + uz
-    return 0 if far else extent[b, 0] + 5
-
-
-@helper
-def any_near(b, first, last, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells):
-    """Whether there may be particles within `reach` of the corners first … last of a row."""
-    x = corner_place(b, first - 2, j, k, lower, spacing, origin, cells)
-    least, most = x[0], x[0]
-    for n in range(first + 1, last):
-        place = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-        least, most = min(least, place[0]), max(most, place[0])
-    half, wide = 0.5 * (most - least), 1.001 * reach
-    around = tuple(wide + half if d == 0 else wide for d in static_range(DIMENSIONS))
-    middle = tuple(least + half if d == 0 else x[d] for d in static_range(DIMENSIONS))
-    return any_particle(middle, around, start, lower, size, low, window, strides)
-
-
-@driver
-def find_distances(
-    begin, end, near, distance, radius, volume, profile, position, start, order, lower, size, low, window, strides,
-    shape, spacing, origin, extent, cells,
-):  # fmt: skip
-    """distance [m] to the wall, at most `radius`, at the corners of all cells of `near` blocks, by how much of the
-    kernel is filled. An item is a row of corners along x."""
-    sums = workspace(1)
-    for r in range(begin, end):
-        b, j, k = corner_row(r, shape)
-        last = corners_of_row(near, b, j, k, extent)
-        row_seen = last > 0 and any_near(
-            b, 0, last, j, k, radius, start, lower, size, low, window, strides, spacing, origin, cells
-        )
-        for first in range(0, last, STRETCH):
-            end = min(first + STRETCH, last)
-            seen = row_seen and any_near(
-                b, first, end, j, k, radius, start, lower, size, low, window, strides, spacing, origin, cells
-            )
-            for n in range(first, end):
-                x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-                sums[0] = 0.0
-                if seen:
-                    sum_particles(sums, x, radius, volume, position, start, order, lower, size, low, window, strides)
-                value = distance_of(sums[0], profile, radius)
-                distance[corner_at(b, n - 2, j, k, shape)] = off_corner(value, spacing)
-
-
-@driver
-def add_balls(
-    begin, end, near, distance, largest, reach, ball, position, start, order, lower, size, low, window, strides, shape,
-    spacing, origin, extent, cells,
-):  # fmt: skip
-    """distance becomes that to the balls, none more than the `largest` [m], where they are nearer. An item is a row of
-    corners along x."""
-    for r in range(begin, end):
-        b, j, k = corner_row(r, shape)
-        last = corners_of_row(near, b, j, k, extent)
-        row_seen = last > 0 and any_near(
-            b, 0, last, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells
-        )
-        for first in range(0, last if row_seen else 0, STRETCH):
-            end = min(first + STRETCH, last)
-            seen = any_near(
-                b, first, end, j, k, reach, start, lower, size, low, window, strides, spacing, origin, cells
-            )
-            for n in range(first, end if seen else first):
-                at = corner_at(b, n - 2, j, k, shape)
-                if distance[at] > -largest:
-                    x = corner_place(b, n - 2, j, k, lower, spacing, origin, cells)
-                    wide = min(reach, distance[at] + 1.001 * largest)  # balls beyond are not nearer
-                    value = nearest_ball(x, wide, ball, position, start, order, lower, size, low, window, strides)
-                    distance[at] = min(distance[at], off_corner(value, spacing))
+# ---- what is open ---------------------------------------------------------------------------------------------------
 
 
 @row
@@ -440,6 +170,24 @@ def is_needy(fraction_old, fraction_new, swept, at, share):
     return min(smaller(fraction_old, fraction_new, at), load(swept, share)) < NEEDY
 
 
+@row
+def flow_row(kind, fraction_old, fraction_new, swept, at, share, n):
+    """The n cells from `at` on hold FLUID that needs no company; returns how many need it nevertheless."""
+    count = 0
+    for i in range(n):
+        store(kind, at + i, FLUID)
+        count += 1 if is_needy(fraction_old, fraction_new, swept, at + i, share + i) else 0
+    return count
+
+
+@row
+def clear_row(master, first, cells, n):
+    """The n cells whose first component in `master` is at `first` join no other."""
+    for d in static_range(DIMENSIONS):
+        for i in range(n):
+            store(master, first + d * cells + i, 0)
+
+
 @helper
 def is_in_domain(index, offset, grid_cells):
     """Whether the cell at `offset` from the cell `index` of the grid is one of its cells."""
@@ -477,12 +225,12 @@ def find_masters(
     for r in range(begin, end):
         b = r // (shape[0] * shape[1])
         j, k = row_place(r, shape)
-        for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
+        n, at = (cells_of_row(r, b, shape, extent) if near[b] > 0 else 0), cell_at(b, 0, j, k, shape)
+        share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
+        clear_row(master, first, cells, n)
+        for i in range(n if flow_row(kind, fraction_old, fraction_new, swept, at, share, n) > 0 else 0):
             at = cell_at(b, i, j, k, shape)
             share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
-            for d in static_range(DIMENSIONS):
-                master[first + d * cells] = 0
-            kind[at] = FLUID
             if not is_needy(fraction_old, fraction_new, swept, at, share):
                 continue
             index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)

@@ -10,7 +10,7 @@ import numpy as np
 
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as kernels
-from distfsi.kernels import cut_forces
+from distfsi.kernels import cut_forces, push
 from distfsi.kernels import rows as row_kernels
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
@@ -31,7 +31,8 @@ PARTICLE_DRIVERS = (
     kernels.find_depth,
     kernels.list_cells,
     kernels.find_wall_velocity,
-    kernels.push,
+    push.find_homes,
+    push.push,
     cut_forces.clear,
 )
 FLUID_DRIVERS = (
@@ -62,7 +63,7 @@ class Coupling:
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
-        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
+        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": 1})
         self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
 
@@ -193,10 +194,12 @@ class Coupling:
         self._run(self.fluid_kernels.spread, *wall, self._kick, self._shape)
         self._exchange(self._kick, np.arange(D), 0.0)
         impulse, home, image = team.empty((own, D)), team.empty(own, np.int64), team.array(np.ones((own, D)))
+        start, grid = self.solid.start, (self._lower, self._widths)
+        team.run(self.kernels.find_homes, own, start, home, *grid, *self._homes, self.blocks.first)
         team.run(
-            self.kernels.push, own, self.solid.start, self.solid.start, *self.solid.columns.read("mass"), image,
-            impulse, home, self.reach, self._kinds, kernels.COVERED, self._kick, self._shape, self._lower, self._widths,
-            self._origin, self._extent, self._seen_cells, *self._homes, self.blocks.first,
+            self.kernels.push, own, team.array(np.arange(own)), start, home, *self.solid.columns.read("mass"), image,
+            impulse, self.reach, self._kinds, kernels.COVERED, self._kick, self._shape, *grid, self._origin,
+            self._extent, self._seen_cells, self._homes[0],
         )  # fmt: skip
         self._run(self.kernels.clear, self._covered, D, self._kick.reshape(-1), self._shape)
         self._ledger["wall"] -= self._per_block(kernels.COVERED_CELLS, self._passed)

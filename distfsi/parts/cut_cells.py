@@ -11,7 +11,7 @@ import numpy as np
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
-from distfsi.kernels import cut_fluxes, cut_forces, images
+from distfsi.kernels import cut_fluxes, cut_forces, images, push
 from distfsi.kernels import rows as row_kernels
 from distfsi.kernels.band import BAND, FAR
 from distfsi.kernels.particles import EXCHANGE
@@ -26,6 +26,7 @@ from distfsi.parts.dust import Dust
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
 from distfsi.parts.solid import Solid
+from distfsi.parts.thickness import Thickness
 from distfsi.parts.wall_geometry import WallGeometry
 from distfsi.parts.wall_points import WallPoints
 from distfsi.scene.description import Scene
@@ -45,6 +46,7 @@ PARTICLE_DRIVERS = (
     cut_forces.mark_stretched,
     cut_forces.find_middle,
     cut_forces.find_momentum,
+    cut_forces.mark_walled,
     cut_forces.see_particles,
     cut_forces.find_pressures,
     cut_forces.find_debts,
@@ -52,7 +54,8 @@ PARTICLE_DRIVERS = (
     *dust.PARTICLE_DRIVERS,
     images.weigh_images,
     images.fade_images,
-    immersed_kernels.push,
+    push.find_homes,
+    push.push,
 )
 FLUID_DRIVERS = (
     kernels.take_contents,
@@ -99,7 +102,7 @@ class CutCells:
         self.wall = WallGeometry(
             blocks, team, max(body.spacing for body in scene.solid.bodies), real, scene.coupling.scheme == "stairs"
         )
-        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions})
+        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes})
         self.fluid_kernels = team.build(
             FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
         )
@@ -133,6 +136,7 @@ class CutCells:
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         self._find_sides()
         self._keep_lists([team.empty(0, np.int64)] * 3, np.zeros((blocks.local_count, 3), dtype=np.int64))
+        self._thickness = Thickness(solid.columns, self.wall, max(grid.spacing[: grid.dimensions]))
         (position,) = solid.columns.read("position")
         self._look(position)
         self.dust.find(solid.columns, self._middle, self._middle_bins)
@@ -191,19 +195,24 @@ class CutCells:
     def follow(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         team, D = self.team, self._dimensions
-        self._look(self.solid.start)
+        self._thickness.way += self._look(self.solid.start)
         self.dust.find(self.solid.columns, self._middle, self._middle_bins)
         self._cut(self.solid.start, self.solid.carried)
         self._find_company()
         n = self._band.shape[0]
-        self._area, self._velocity = (team.empty((n, D)) for _ in range(2))
-        self._inertia, self._start_volume = (team.empty(n) for _ in range(2))
+        self._area, self._start_volume = team.empty((n, D)), team.empty(n)
+        self._velocity, self._inertia = team.zeros((n, D)), team.zeros(n)
         self._impulse, self._work = team.zeros((n, D)), team.zeros(n)
         self._opened, self._seen = team.empty((n, 2 * D)), team.empty(2 * D * n, np.int8)
         self._run(self.fluid_kernels.find_walls, self._area, self._opened, *self._walls, self.wall.spacing)
         self._run(self.fluid_kernels.find_faces, self._above, self._opened, self._seen, *self._walls)
         self._faces = self._particles.rows.marked(self._seen)[1]
         self._flux = team.empty((n, 2 * D * self.model.constants["FLUXES"]))
+        mark = team.empty(n, np.int8)
+        self._run(self.kernels.mark_walled, self._area, mark)
+        walled = self._particles.rows.marked(mark)[1]
+        cells = self._particles.rows.taken(self._band, walled)
+        self._walled = self.wall.near_order(walled, cells, self.blocks.shape)
         self._see(self._particle_velocity, self._velocity)
         self._near_sides = self.wall.band_rows(self._sides[0])
 
@@ -260,10 +269,14 @@ class CutCells:
         )
         self._near_ghosts.exchange((self._kick, self._vector_parity))
         given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
+        chosen = wall.coarse_order(self._own_middle, *self.solid.columns.read("id"))
+        grid = (self._corners[0], wall.spacing)
+        homes = (wall.cells, *self._homes, self.blocks.first)
+        self.team.run(self.kernels.find_homes, own, self.solid.start, home, *grid, *homes)
         self.team.run(
-            self.kernels.push, own, self.solid.start, self._own_middle, self._own_mass, self._image, given, home,
-            wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, self._corners[0], wall.spacing, wall.origin,
-            wall.extent, self._seen_cells, wall.cells, *self._homes, self.blocks.first,
+            self.kernels.push, -(-own // wall.lanes), chosen, self._own_middle, home, self._own_mass, self._image,
+            given, wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, *grid, wall.origin, wall.extent,
+            self._seen_cells, wall.cells,
         )  # fmt: skip
         for cells in (self._band, *self._near_ghosts.cells):
             self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
@@ -287,7 +300,7 @@ class CutCells:
         wall: the fluid pays for it."""
         D, P = self._dimensions, self.model.phases
         (velocity,) = self._plan.exchange([(excess, tuple((a,) for a in range(D)))])
-        mean, paid = self.team.empty(self._velocity.shape), self.team.empty(self._band.shape)
+        mean, paid = self.team.zeros(self._velocity.shape), self.team.empty(self._band.shape)
         self._see(velocity, mean)
         debt = self._debt.reshape(-1)
         self._run(self.kernels.find_debts, debt, self._impulse, mean)
@@ -327,14 +340,19 @@ class CutCells:
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
-    def _look(self, start: Any) -> None:
-        """The particles around this rank's, which have moved from `start`."""
+    def _look(self, start: Any) -> float:
+        """Collective. The particles around this rank's, which have moved from `start`; how far one did at most [m]."""
         c, team, own = self.solid.columns, self.team, self.solid.count
-        self._own_middle = team.empty(start.shape)
-        team.run(self.kernels.find_middle, own, start, *c.read("position"), self._own_middle)
+        self._own_middle, way = team.empty(start.shape), team.empty(own)
+        team.run(self.kernels.find_middle, own, start, *c.read("position"), self._own_middle, way)
+        self._stretched = self._points.stretched(c)
+        most = np.array([self._particles.rows.largest(way, 0.0), float(self._stretched.shape[0])])
+        farthest, split = self.blocks.communicator.maximum(most)
+        self._split = split > 0.0
         self._plan = self._ghosts(start, c["id"])
         (self._middle,) = self._plan.exchange([(self._own_middle, "position")])
         self._middle_bins = self.wall.sort(self._middle, self._plan.key.there)
+        return farthest
 
     def _cut(self, start: Any, velocity: Any) -> None:
         """The cells cut by the particles that _look() has found, which have moved from `start` with `velocity`."""
@@ -343,22 +361,21 @@ class CutCells:
         team.run(self.kernels.keep_mass, own, start, *known, *self._corners, self._own_mass)
         vector = tuple((a,) for a in range(self._dimensions))
         self._particle_velocity, self._mass = self._plan.exchange([(velocity, vector), (self._own_mass, ((),))])
-        point, size, number = self._points.of(c)
+        (point,), size, plan = c.read("position"), self._points.volumes(c), self._plan
+        if self._split:
+            point, size, number = self._points.of(c, self._stretched)
+            plan = self._ghosts(point, number)
         inside = team.empty((point.shape[0], 2))
         team.run(self.kernels.keep_inside, point.shape[0], point, size, *self._corners, inside)
-        plan = self._plan if number is c["id"] else self._ghosts(point, number)
         position, volume = plan.exchange([(point, "position"), (inside, ((), ()))])
         bins = wall.sort(position, plan.key.there)
         points = (plan.key.there, volume, position, *bins)
         self._image, image = self._weigh_images(plan, point, size, points)
         team.run(self.kernels.fade_images, plan.count, plan.key.there, image, 2, volume.reshape(-1))
-        if number is not c["id"]:
-            size = team.empty((own, 1))
-            team.run(self.kernels.find_volumes, own, *known, size)
-            self._image, image = self._weigh_images(self._plan, *c.read("position"), size, points)
+        if self._split:
+            self._image, image = self._weigh_images(self._plan, *c.read("position"), self._points.volumes(c), points)
         team.run(self.kernels.fade_images, self._plan.count, self._plan.key.there, image, 1, self._mass)
-        (filled,) = plan.exchange([(wall.fill(plan.own, position, volume, bins), ((), *vector))])
-        (ball,) = plan.exchange([(wall.thicken(plan.own, filled, position, volume, bins), ((), (), *vector))])
+        ball = self._thickness.balls(c, plan, position, volume, bins, self._split)
         wall.cut(position, volume, ball, plan.key.there, bins)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
@@ -422,14 +439,15 @@ class CutCells:
         self._groups = Groups(self.team, self.kernels, self._band_cells)
 
     def _see(self, velocity: Any, mean: Any) -> None:
-        """mean (band, D) of particles' velocities around the cells, where the particles were in the middle of the step:
-        only there is the way that a turning wall went along itself."""
+        """mean (band, D) of particles' velocities around the cells with a wall, where the particles were in the middle
+        of the step: only there is the way that a turning wall went along itself."""
         count, wall = velocity.shape[0], self.wall
         momentum = self.team.empty((count, 1 + self._dimensions))
         self.team.run(self.kernels.find_momentum, count, self._mass, velocity, momentum)
-        self._run(
-            self.kernels.see_particles, self._area, mean, self._inertia, wall.seen, momentum, self._middle,
-            *self._middle_bins, wall.shape, wall.spacing, wall.origin,
+        self.team.run(
+            self.kernels.see_particles, -(-self._walled.shape[0] // wall.lanes), self._band, self._walled, mean,
+            self._inertia, wall.seen, momentum.reshape(-1), self._middle, *self._middle_bins, wall.shape, wall.spacing,
+            wall.origin,
         )  # fmt: skip
 
     def _mix(self, U: Any, fraction: Any) -> None:
@@ -512,6 +530,7 @@ class CutCells:
         return {
             "cells": {"swept": self.blocks.without_ghosts(self.swept.here()[:, :1])},
             "sums": {"wall": self._wall_sums, "sides": self._through_sides.here()},
+            "values": {"way": np.array(self._thickness.way)},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -520,6 +539,7 @@ class CutCells:
         self.swept.changed()
         self._classify()
         self._exchange_swept()
+        self._thickness.way = float(snapshot["values"]["way"])
         self._wall_sums[:] = snapshot["sums"]["wall"]
         self._through_sides.here()[:] = snapshot["sums"]["sides"]
         self._through_sides.changed()

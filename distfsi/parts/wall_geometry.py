@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.seam import Device, Pair
-from distfsi.kernels import band
+from distfsi.kernels import band, wall_distance
 from distfsi.kernels import cut_geometry as kernels
 from distfsi.kernels.rows import count_marked, list_marked, take_rows
 from distfsi.mesh.blocks import Blocks
@@ -24,15 +24,17 @@ MARGIN = 0.15  # of a cell, on each side: what thin bodies are thicker than must
 THIN, THICK = 0.1, 0.45  # of a cell, beyond its diagonal: the thickness up to which a body is thin, and from which not
 REACHES, AWAY, ASIDE = 0.2, 0.6, 0.9  # half cells or spacings: gaps to the domain's ends, width of a column of a body
 PROFILE_POINTS = 1025
+NEAR_LANES = 8  # points that are computed side by side: more would lie farther apart
 DRIVERS = (
     *search.DRIVERS,
     take_rows,
-    kernels.fill_kernel,
-    kernels.thicken,
-    kernels.find_near,
-    kernels.mark_balls,
-    kernels.find_distances,
-    kernels.add_balls,
+    wall_distance.fill_kernel,
+    wall_distance.thicken,
+    wall_distance.find_near,
+    wall_distance.mark_balls,
+    wall_distance.mark_corners,
+    wall_distance.find_distances,
+    wall_distance.add_balls,
     kernels.open_up,
     kernels.mark_cut_blocks,
     kernels.find_masters,
@@ -69,6 +71,11 @@ def plate_share(dimensions: int, thickness: float) -> float:
     return float(density[np.abs(s) < 0.5 * thickness].sum() / density.sum())
 
 
+def _columns(values: Any) -> tuple[Any, int]:
+    """Values (n, k) as they lie in memory, and k."""
+    return values.reshape(-1), values.shape[1]
+
+
 class WallGeometry:
     """Open parts of cells and faces, before and after a step; arrays are the device's.
 
@@ -77,6 +84,7 @@ class WallGeometry:
     near       (local blocks,) which blocks had particles near them or cells that were not whole
     mark       field (local blocks, 1, Z, Y, X): what cells are to the coupling (kernels/band.py), no ghosts included
     shape, steps, offsets, origin, extent, spacing, cells: of blocks, of ways to neighbours, of the grid
+    lanes      how many points that lie near each other are computed side by side
     images     [m]: how far from an end of the domain particles may be that have images there; touching (3,) [m]: how
                far from it their body may be for these to count in full, and not at all; how wide its columns are
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
@@ -86,7 +94,10 @@ class WallGeometry:
         """`spacing` [m] of the coarsest particles; `stairs`: cells are open as a whole or not at all."""
         self._stairs = stairs
         self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
-        self.kernels: SimpleNamespace = team.build((*DRIVERS, *(STAIRS if stairs else ())), {"DIMENSIONS": D})
+        self.lanes = min(team.lanes, NEAR_LANES)
+        self.kernels: SimpleNamespace = team.build(
+            (*DRIVERS, *(STAIRS if stairs else ())), {"DIMENSIONS": D, "LANES": self.lanes}
+        )
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
         self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h
@@ -127,19 +138,35 @@ class WallGeometry:
         """Particles by the cells of the grid they are in."""
         return self._cells.sort(position, key, self._search_cell)[1]
 
-    def fill(self, own: int, position: Any, volume: Any, bins: SearchCells) -> Any:
+    def coarse_order(self, position: Any, key: Any) -> Any:
+        """Particles so that those near each other, a few in a cell, follow each other."""
+        return self._cells.sort(position, key, 2.0 * self._search_cell)[1].order
+
+    def near_order(self, values: Any, at: Any, shape: tuple[int, ...]) -> Any:
+        """`values` (n,) of what lies `at` (n,) in the memory of a field of a `shape` (Z, Y, X) per block, so that those
+        near each other follow each other. Where one is computed at a time the order does not matter."""
+        if self.lanes == 1:
+            return values
+        row, x = np.divmod(self.team.get(at), shape[2])
+        layer, y = np.divmod(row, shape[1])
+        brick = (layer // 2 * shape[1] + y // 2) * shape[2] + x // 2
+        return self.team.array(self.team.get(values)[np.argsort(brick, kind="stable")])
+
+    def fill(self, own: int, chosen: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
         """Share of the broad kernel around each of the first `own` particles that is filled, and the mean way [m] to
-        what fills it, (own, 1 + D)."""
+        what fills it, (own, 1 + D). `chosen` (m,): all own particles and maybe others, as of coarse_order()."""
         filled = self.team.empty((own, 1 + self.blocks.grid.dimensions))
-        self.team.run(self.kernels.fill_kernel, own, filled, self.radius, volume, position, *bins)
+        boxes = -(-chosen.shape[0] // self.lanes)
+        self.team.run(self.kernels.fill_kernel, boxes, filled, chosen, self.radius, *_columns(volume), position, *bins)
         return filled
 
-    def thicken(self, own: int, filled: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
-        """Balls (own, 2 + D) as which particles of thin bodies count (kernels/cut_geometry.py); `filled` of all."""
+    def thicken(self, own: int, filled: Any, chosen: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
+        """Balls (own, 2 + D) as which particles of thin bodies count (kernels/wall_distance.py); `filled` of all,
+        `chosen` as for fill()."""
         ball = self.team.empty((own, 2 + self.blocks.grid.dimensions))
-        self.team.run(
-            self.kernels.thicken, own, ball, filled, self.radius, self.ball, *self._thickness, volume, position, *bins
-        )
+        boxes, sizes = -(-chosen.shape[0] // self.lanes), (self.radius, self.ball, *self._thickness)
+        around = (chosen, *sizes, *_columns(volume), position, *bins)
+        self.team.run(self.kernels.thicken, boxes, ball, filled.reshape(-1), *around)
         return ball
 
     def cut(self, position: Any, volume: Any, ball: Any, key: Any, bins: SearchCells) -> None:
@@ -147,15 +174,16 @@ class WallGeometry:
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
         run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.there
         mark = self.team.empty(position.shape[0], np.int8)
-        run(k.mark_balls, position.shape[0], ball, mark)
+        run(k.mark_balls, position.shape[0], ball, volume, mark)
         balls, rows = self._rows.marked(mark)
-        run(k.find_near, count, near, self.search if balls else self.radius, bins.start, *bins[2:], *self._grid[:3])
-        run(
-            k.find_distances, self._corner_rows, near, self._corners, self.radius, volume, self._profile, position,
-            *bins, self.shape, *self._grid,
-        )  # fmt: skip
+        reach = self.search if balls else self.radius
+        run(k.find_near, count, near, reach, bins.start, *bins[2:], *self._grid[:3])
+        corners = self._corners_near(reach, bins)
+        boxes, grid = -(-corners.shape[0] // self.lanes), (self.shape, self.spacing, self.origin, self.cells)
+        particles = (*_columns(volume), self._profile, position, *bins)
+        run(k.find_distances, boxes, corners, self._corners, self.radius, *particles, *grid)
         if balls:
-            self.add_balls(*(self._rows.taken(array, rows) for array in (position, ball, key)))
+            self.add_balls(corners, *(self._rows.taken(array, rows) for array in (position, ball, key)))
         before, after = self.parts
         is_cut = self.team.empty(self._count, np.int8)
         run(
@@ -166,12 +194,22 @@ class WallGeometry:
             run(k.close_stairs, self._count, near, after, self.faces[1], self.shape, self.steps)
         run(k.mark_cut_blocks, count, near, is_cut, prod(self.blocks.shape[:2]))
 
-    def add_balls(self, position: Any, ball: Any, key: Any) -> None:
-        """Distances become those to these particles' balls where they are nearer."""
-        bins = self._cells.sort(position, key, 2.0 * self._search_cell)[1]
+    def _corners_near(self, reach: float, bins: SearchCells) -> Any:
+        """The corners (n,) that may have particles within `reach` [m]; the others are open."""
+        mark = self.team.zeros(self._corners.shape[0], np.int8)
         self.team.run(
-            self.kernels.add_balls, self._corner_rows, self.near.read, self._corners, self.ball, self.search, ball,
-            position, *bins, self.shape, *self._grid,
+            self.kernels.mark_corners, self._corner_rows, self.near.there, self._corners, mark, self.radius, reach,
+            bins.start, *bins[2:], self.shape, *self._grid,
+        )  # fmt: skip
+        corners = self._rows.marked(mark)[1]
+        return self.near_order(corners, corners, self._distance.there.shape[1:])
+
+    def add_balls(self, corners: Any, position: Any, ball: Any, key: Any) -> None:
+        """Distances at the `corners` become those to these particles' balls where they are nearer."""
+        bins, boxes = self._cells.sort(position, key, 2.0 * self._search_cell)[1], -(-corners.shape[0] // self.lanes)
+        self.team.run(
+            self.kernels.add_balls, boxes, corners, self._corners, self.ball, self.search, ball, position, *bins,
+            self.shape, self.spacing, self.origin, self.cells,
         )  # fmt: skip
 
     @property
@@ -241,7 +279,7 @@ class WallGeometry:
         )  # fmt: skip
         counts = self.team.get(found)
         in_blocks = counts.reshape(self.blocks.local_count, prod(self.blocks.shape[:2]), 3).sum(axis=1)
-        near.here()[(near.here() != kernels.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
+        near.here()[(near.here() != wall_distance.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
         near.changed()
         first = self.team.array(np.cumsum(counts, axis=0) - counts)
         lists = [self.team.empty(n, np.int64) for n in in_blocks.sum(axis=0)]

@@ -26,19 +26,26 @@ class WallPoints:
         """`cell` [m]: the size of cells."""
         self._rows, self._device, self._kernels, self._cell = rows, rows.device, kernels, cell
 
-    def of(self, c: Columns) -> tuple[Any, Any, np.ndarray]:
+    def stretched(self, c: Columns) -> Any:
+        """The rows (n,) of this rank's particles, whose columns are `c`, that are more than one point."""
+        mark = self._device.zeros(len(c["id"]), np.int8)
+        if "deformation" in c:
+            shape = c.read("volume", "bond_count", "deformation")
+            self._device.run(self._kernels.mark_stretched, mark.shape[0], self._cell, FARTHEST, *shape, mark)
+        return self._rows.marked(mark)[1]
+
+    def volumes(self, c: Columns) -> Any:
+        """Of this rank's particles (own, 1) [m^D], none of lone ones."""
+        volume = self._device.empty((len(c["id"]), 1))
+        self._device.run(self._kernels.find_volumes, volume.shape[0], *c.read("dust", "mass", "density"), volume)
+        return volume
+
+    def of(self, c: Columns, stretched: Any) -> tuple[Any, Any, np.ndarray]:
         """Position (n, D) [m] and volume (n, 1) [m^D], on the device, and number (n,) of the points of this rank's
-        particles, whose columns are `c`; the numbers are the particles' ids where there are no bonds."""
+        particles, of which the `stretched` ones are split."""
         (position,), own = c.read("position"), len(c["id"])
-        volume = self._device.empty((own, 1))
-        self._device.run(self._kernels.find_volumes, own, *c.read("dust", "mass", "density"), volume)
-        if "deformation" not in c:
-            return position, volume, c["id"]
-        mark, number = self._device.empty(own, np.int8), c["id"] * PER_PARTICLE
-        shape = c.read("volume", "bond_count", "deformation")
-        self._device.run(self._kernels.mark_stretched, own, self._cell, FARTHEST, *shape, mark)
-        count, stretched = self._rows.marked(mark)
-        if count == 0:
+        volume, number = self.volumes(c), c["id"] * PER_PARTICLE
+        if stretched.shape[0] == 0:
             return position, volume, number
         taken = (self._rows.taken(a, stretched) for a in (position, volume, *c.read("volume", "deformation")))
         points = self._split(*(self._device.get(a) for a in taken))

@@ -7,14 +7,15 @@ from distfsi.physics.symbols import DIMENSIONS
 
 def smoothing_kernel(distance2, h):
     """W [1/m^d] at the squared distance `distance2` [m2], below (2h)^2."""
-    q = sqrt(distance2) / h
+    inverse = 1.0 / h
+    q = sqrt(distance2) * inverse
     s = 1.0 - 0.5 * q
     if DIMENSIONS == 1:
-        return 0.625 / h * s * s * s * (1.0 + 1.5 * q)
+        return 0.625 * inverse * s * s * s * (1.0 + 1.5 * q)
     if DIMENSIONS == 2:
-        return 1.75 / pi / (h * h) * s * s * s * s * (1.0 + 2.0 * q)
+        return 1.75 / pi * inverse * inverse * s * s * s * s * (1.0 + 2.0 * q)
     if DIMENSIONS == 3:
-        return 1.3125 / pi / (h * h * h) * s * s * s * s * (1.0 + 2.0 * q)
+        return 1.3125 / pi * inverse * inverse * inverse * s * s * s * s * (1.0 + 2.0 * q)
 
 
 def smoothing_slope(distance2, h):

@@ -141,7 +141,9 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
             coupling.evict()
             coupling.sealed()
             coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
-            coupling.wall.add_balls(gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64))
+            coupling.wall.add_balls(
+                gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)
+            )
         simulation.watch()
     return gpu
 
