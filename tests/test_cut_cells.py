@@ -552,9 +552,37 @@ def test_a_film_between_sliding_bodies_is_squeezed_out_and_comes_back():
 # ---- lone particles --------------------------------------------------------------------------------------------------
 
 
+def added_mass(dimensions):
+    """Of a disc or a sphere, in masses of what it displaces."""
+    return 1.0 if dimensions == 2 else 0.5
+
+
+@pytest.mark.parametrize("dimensions", [2, pytest.param(3, marks=pytest.mark.full)])
+def test_a_weak_wave_in_water_takes_lone_particles_along(dimensions):
+    """With (1 + C) rho/(rho_s + C rho) of its velocity, the added mass being C rho (Landau, Lifshitz, Fluid Mechanics,
+    Sec. 11): those that are lighter are faster than the water."""
+    D, c, across = dimensions, sqrt(4.4 * 61.0), (0.0,) * (dimensions - 1)
+    densities, water = (0.1, 1.0, 7.8), (d.Phase("water", d.StiffenedGas(4.4, 60.0)),)
+    places = [(0.5, 0.05 + 0.1 * n, 0.14)[:D] for n in range(len(densities))]
+    specks = [speck(x, 0.001, density, (0.0, *across)) for x, density in zip(places, densities, strict=True)]
+    u = 1e-6 * c
+    behind = gas(1.0 + u / c, 1.0 + c * u, (u, *across)), HalfSpace((0.3, *across), (1.0, *across))
+    regions, kinds = [(gas(1.0, 1.0, (0.0, *across)), None), behind], (OPEN, *(("wall", "wall"),) * (D - 1))
+    box = (0.0,) * D, (1.0, 0.3, 0.3)[:D], (40, 12, 12)[:D]
+    case = coupled(specks, regions, *box, kinds, phases=water, form="total_lagrangian", cfl=0.8)
+    before = case.balance()
+    while case.simulation.time < 0.5 / c:
+        case.step()
+    C, exact = added_mass(D), np.array(densities)
+    reached = case.solid.columns["velocity"][np.argsort(case.solid.columns["id"])] / u
+    assert reached[:, 0] == pytest.approx((1.0 + C) / (exact + C), rel=1e-2)
+    assert np.abs(reached[:, 1:]).max() < 1e-3
+    assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
+
+
 @pytest.mark.parametrize("dimensions", [2, pytest.param(3, marks=pytest.mark.full)])
 def test_a_lone_particle_is_dragged_along_as_a_sphere(dimensions):
-    """As m dv/dt = 1/2 rho Cd A (u - v)^2 says; gas that it goes along with does not change by a bit."""
+    """As (m + added mass) dv/dt = 1/2 rho Cd A (u - v)^2 says; gas that it goes along with does not change by a bit."""
     D, side, density = dimensions, 0.02 / 16, 20.0
     drag = {
         name: plain(getattr(physics_drag, name), {"DIMENSIONS": D}) for name in ("drag_coefficient", "frontal_area")
@@ -575,7 +603,7 @@ def test_a_lone_particle_is_dragged_along_as_a_sphere(dimensions):
     slip, steps = u, 4000
     for _ in range(steps):  # the speed of sound is 1
         force = 0.5 * 1.4 * drag["drag_coefficient"](slip) * drag["frontal_area"](side**D) * slip**2
-        slip -= times[0.0] / steps * force / (density * side**D)
+        slip -= times[0.0] / steps * force / ((density + added_mass(D) * 1.4) * side**D)
     assert 0.2 < slip / u < 0.8 and u - speeds[0.0] == pytest.approx(slip, rel=1e-2)
 
 

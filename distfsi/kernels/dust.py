@@ -1,7 +1,8 @@
-"""Loops of lone particles: which they are, and the drag between them and the gas of the cells that they are in.
+"""Loops of lone particles: which they are, and the forces between them and the gas of the cells that they are in.
 
 Cells are named as in kernels/coupling.py. `rows` (n,): the particles that are lone, in the order of their ids; `at`
 (n,): the cells that they are in; `place` (n, D) and what follows it: where they are, and the fields of SearchCells.
+`follows` (n, 2) [kg]: masses that follow the gas, see physics/drag.py; `pressed` (n, D) [m/s]: change of its velocity.
 """
 
 from math import floor
@@ -9,8 +10,9 @@ from math import floor
 from distfsi.device.markers import driver, helper, load, real, store, workspace
 from distfsi.kernels.coupling import cell_at, home_of, three
 from distfsi.kernels.cut_cells import share_at, state_at
+from distfsi.kernels.cut_fluxes import open_between
 from distfsi.kernels.gather import bins_around
-from distfsi.physics.drag import mass_that_follows
+from distfsi.physics.drag import masses_that_follow
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, PHASES, VARIABLES, primitives, sound_speed
 from distfsi.physics.tensors import dot
@@ -50,17 +52,28 @@ def mark_dust(begin, end, dust, mark):
         mark[i] = 1 if dust[i] == DUST else 0
 
 
+@helper
+def slope(U, kind, old, new, at, axis, step, h, cells):
+    """How the pressure changes [Pa/m] along an axis: between the neighbours behind open faces of a cell, or the cell
+    and the only one."""
+    low = at - step if open_between(kind, old, new, at, axis, step, cells) > 0.0 else at
+    high = at + step if open_between(kind, old, new, at + step, axis, step, cells) > 0.0 else at
+    W_low, W_high = primitives(state_at(U, low, cells)), primitives(state_at(U, high, cells))
+    rise = W_high[PHASES + DIMENSIONS] - W_low[PHASES + DIMENSIONS]
+    return rise * real(1.0 / (h * ((1 if low != at else 0) + (1 if high != at else 0))) if high != low else 0.0)
+
+
 @driver
 def feel_gas(
-    begin, end, rows, place, at, follows, velocity, mass, density, U, swept, dt, shape, lower, spacing, origin,
-    grid_cells, block_cells, curve_index, first_block,
+    begin, end, rows, place, at, follows, pressed, velocity, mass, density, U, swept, pressing, kind, old, new, steps,
+    dt, shape, lower, spacing, origin, grid_cells, block_cells, curve_index, first_block,
 ):  # fmt: skip
-    """at[n] = the cell that a lone particle is in, -1 where there is no fluid; follows[n] [kg] of its mass (see
-    physics/drag.py)."""
+    """at[n] = the cell that a lone particle is in, -1 where there is no fluid; then follows and pressed are known.
+    `pressing`: the states, ghosts included, whose pressures have moved the gas in the last stage."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
         p, x = rows[n], three(place, n)
-        at[n], follows[n] = -1, 0.0
+        at[n] = -1
         index = tuple(int(floor((x[d] - lower[d]) / spacing[d])) for d in static_range(3))
         inside = True
         for d in static_range(DIMENSIONS):
@@ -73,25 +86,31 @@ def feel_gas(
                 W = primitives(state)
                 at[n] = here
                 m, volume = real(mass[p]), real(mass[p] / density[p])
-                follows[n] = mass_that_follows(state, W, sound_speed(W), v, m, volume, real(dt))
+                pressed_mass, dragged_mass = masses_that_follow(state, W, sound_speed(W), v, m, volume, real(dt))
+                follows[n, 0] = pressed_mass
+                follows[n, 1] = dragged_mass
+                rho = sum(state[k] for k in static_range(PHASES))
+                for d in static_range(DIMENSIONS):
+                    gradient = slope(pressing, kind, old, new, here, d, steps[d], spacing[d], cells)
+                    pressed[n, d] = -dt * gradient / rho
 
 
 @driver
 def drag(
-    begin, end, rows, place, at, follows, velocity, U, swept, volume, impulse, shape, spacing, start, order, lower,
-    size, low, window, strides,
+    begin, end, rows, place, at, follows, pressed, velocity, U, swept, volume, impulse, shape, spacing, start, order,
+    lower, size, low, window, strides,
 ):  # fmt: skip
-    """impulse[p] (D,) [N s] = what the gas of its cell, of a `volume`, gives to a lone particle in a step: all that are
-    in the cell come nearer to one velocity at once."""
+    """impulse[p] (D,) [N s] = what the gas of its cell, of a `volume`, gives to a lone particle in a step.
+
+    All that are in the cell get a share of what pressure gives to the gas, which keeps the rest, and come nearer to one
+    velocity, at once: so neither swings, however light they are or many.
+    """
     cells = shape[0] * shape[1] * shape[2]
-    sums = workspace(1 + DIMENSIONS)
+    sums = workspace(2 + DIMENSIONS)
     for n in range(begin, end):
         if at[n] >= 0:
-            state = state_at(U, at[n], cells)
-            filled = load(swept, share_at(at[n], cells)) * volume
-            sums[0] = filled * sum(state[k] for k in static_range(PHASES))
-            for d in static_range(DIMENSIONS):
-                sums[1 + d] = filled * state[PHASES + d]
+            for v in range(2 + DIMENSIONS):
+                sums[v] = 0.0
             x = tuple(place[n, d] for d in static_range(DIMENSIONS))
             reach = tuple(spacing[d] for d in static_range(DIMENSIONS))
             bx, by, bz = bins_around(x, reach, lower, size, low, window)
@@ -101,11 +120,19 @@ def drag(
                     for m in range(start[row + bx[0]], start[row + bx[1]]):
                         q = order[m]
                         if at[q] == at[n]:
-                            sums[0] += follows[q]
+                            sums[0] += follows[q, 0]
+                            sums[1] += follows[q, 1]
                             for d in static_range(DIMENSIONS):
-                                sums[1 + d] += follows[q] * velocity[rows[q], d]
+                                sums[2 + d] += follows[q, 1] * velocity[rows[q], d]
+            state = state_at(U, at[n], cells)
+            filled = load(swept, share_at(at[n], cells)) * volume
+            held = filled * sum(state[k] for k in static_range(PHASES))
+            kept = held / (held + sums[0])
             for d in static_range(DIMENSIONS):
-                impulse[rows[n], d] = follows[n] * (sums[1 + d] / sums[0] - velocity[rows[n], d])
+                push = kept * pressed[n, d]
+                gas = filled * state[PHASES + d] - sums[0] * push
+                common = (gas + sums[2 + d]) / (held + sums[1])
+                impulse[rows[n], d] = follows[n, 0] * push + follows[n, 1] * (common - velocity[rows[n], d])
 
 
 @helper

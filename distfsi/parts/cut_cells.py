@@ -285,11 +285,12 @@ class CutCells:
         return given
 
     def drag(self, rows: Any, impulse: Any) -> np.ndarray:
-        """The fluid drags the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
+        """The fluid moves the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
         found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
         block, paid = self.dust.drag(
-            self.solid.columns, rows, self.solid.start, self._dt, impulse, self.fluid, self._swept
-        )
+            self.solid.columns, rows, self.solid.start, self._dt, impulse, (self.fluid.there, self._swept),
+            self._input, self._kinds,
+        )  # fmt: skip
         sums = np.zeros((self.blocks.local_count, self._dimensions + 1))
         np.add.at(sums, block, paid)
         self.fluid.wake(np.bincount(block, minlength=len(sums)) > 0)

@@ -1,4 +1,4 @@
-"""Lone particles: too few together to be a wall, they are points that the gas drags along."""
+"""Lone particles: too few together to be a wall, they are points that the gas moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from distfsi.device.seam import Columns
 from distfsi.kernels import dust as kernels
 from distfsi.mesh.rows import Rows
-from distfsi.parts.fluid import Fluid
 from distfsi.parts.search import SearchCells
 from distfsi.parts.wall_geometry import WallGeometry
 
@@ -63,21 +62,23 @@ class Dust:
         return self._device.array(found[np.argsort(c["id"][found])])
 
     def drag(
-        self, c: Columns, rows: Any, start: Any, dt: float, impulse: Any, fluid: Fluid, swept: Any
+        self, c: Columns, rows: Any, start: Any, dt: float, impulse: Any, gas: tuple[Any, Any], pressing: Any, kind: Any
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The `rows` of `impulse` (own, D) [N s] = that of the drag in `dt` [s]; the fluid pays. `start` (own, D) [m]:
-        where particles were when the step began. Returns the local blocks (n,) where fluid was met, and what it pays
-        there (n, D + 1) [N s, J]."""
+        """The `rows` of `impulse` (own, D) [N s] = that of the gas in `dt` [s]; the fluid pays. `start` (own, D) [m]:
+        where particles were when the step began; `gas`: states and volumes; `pressing`: the input of the last stage,
+        ghosts included; `kind` of cells. Returns the local blocks (n,) where fluid was met, and what it pays there
+        (n, D + 1) [N s, J]."""
         device, wall, k, n = self._device, self._wall, self._fluid_kernels, rows.shape[0]
         cell_volume = float(np.prod(wall.blocks.grid.spacing))
         velocity, mass, density, id = c.read("velocity", "mass", "density", "id")
-        place, at, follows = self._rows.taken(start, rows), device.empty(n, np.int64), device.empty(n)
-        paid = device.empty((n, start.shape[1] + 1))
+        place, at, follows = self._rows.taken(start, rows), device.empty(n, np.int64), device.empty((n, 2))
+        pressed, paid = device.empty(place.shape), device.empty((n, start.shape[1] + 1))
         bins = wall.sort(place, self._rows.taken(id, rows))
-        gas, where = (fluid.there, swept), (rows, place, at)
-        device.run(k.feel_gas, n, *where, follows, velocity, mass, density, *gas, dt, *self._grid)
+        where, moves = (rows, place, at), (follows, pressed)
+        around = (pressing, kind, *wall.faces, wall.steps)
+        device.run(k.feel_gas, n, *where, *moves, velocity, mass, density, *gas, *around, dt, *self._grid)
         around = (cell_volume, impulse, wall.shape, wall.spacing, *bins)
-        device.run(k.drag, n, *where, follows, velocity, *gas, *around)
+        device.run(k.drag, n, *where, *moves, velocity, *gas, *around)
         device.run(
             k.pay_drag, n, *where, velocity, mass, impulse, paid, *gas, cell_volume, wall.shape, wall.spacing, *bins
         )
