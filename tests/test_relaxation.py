@@ -7,6 +7,7 @@ import pytest
 
 from distfsi.device import cpu
 from distfsi.device.markers import driver
+from distfsi.kernels.cut_cells import mix
 from distfsi.kernels.fluid import HALVINGS
 from distfsi.mesh.communicator import Communicator
 from distfsi.physics.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
@@ -23,7 +24,7 @@ WITH_JWL = [pair for pair in PAIRS if "tnt" in pair]
 
 
 @driver
-def relax_all(a1, pressures, densities, p_n, finishes, change):
+def relax_all(a1, pressures, densities, p_n, finishes, change, settled):
     """Relaxation alone, of phases whose pressures differ from p_n; to the end where a stage would go there."""
     for i in range(a1.size):
         a2 = 1.0 - a1[i]
@@ -40,8 +41,8 @@ def relax_all(a1, pressures, densities, p_n, finishes, change):
             a1[i] * (pressures[i, 0] - p_n[i]),
             a2 * (pressures[i, 1] - p_n[i]),
         )
-        change[i], settled = relaxed_fraction_change(phases)
-        if finishes and settled < 0.0:
+        change[i], settled[i] = relaxed_fraction_change(phases)
+        if finishes and settled[i] < 0.0:
             low, high = range_of_change(a1[i])
             for _ in range(HALVINGS):
                 low, high = halved_range(phases, low, high)
@@ -133,8 +134,8 @@ def relaxed(pair, decades, finishes=False, samples=SAMPLES):
     a1, pressures, densities = draw(pair, decades, samples)
     first = Path(pair[0], a1, pressures[:, 0], densities[:, 0])
     second = Path(pair[1], 1.0 - a1, pressures[:, 1], densities[:, 1])
-    change = np.empty_like(a1)
-    kernels(pair).relax_all(a1, pressures, densities, pressures.min(axis=1), finishes, change)
+    change, settled = np.empty((2, samples))
+    kernels(pair).relax_all(a1, pressures, densities, pressures.min(axis=1), finishes, change, settled)
     exact = exact_change(first, second)
     assert np.all((a1 + change > 0.0) & (a1 + change < 1.0))
     free = (a1 + exact > 1.01 * TRACE) & (a1 + exact < 1.0 - 1.01 * TRACE)
@@ -177,6 +178,39 @@ def test_jwl_is_brought_to_the_root_from_any_imbalance(pair, decades):
     """1e-10 of the smaller volume fraction, or the last bit of the larger one."""
     change, exact, first, second = relaxed(pair, decades, finishes=True)
     assert np.all(abs(change - exact) <= 1e-10 * smaller_fraction(exact, first, second) + np.finfo(float).eps)
+
+
+@pytest.mark.parametrize("pair", [("tnt", "water"), ("tnt", "air")], ids="-".join)
+def test_contents_of_cut_cells_are_brought_to_the_root(pair):
+    """Of cells that share nothing, with phases up to four times apart, for which refits are not enough."""
+    model, samples = model_of(*pair), SAMPLES
+    a1, pressures, densities = draw(pair, 0.6, samples)
+    a = np.array([a1, 1.0 - a1])
+    first, second = (Path(pair[k], a[k], pressures[:, k], densities[:, k]) for k in range(2))
+    energies = np.array([path.a * (path.p - path.G) / path.omega for path in (first, second)], float)
+    volume = np.random.default_rng(1).uniform(0.3, 1.0, samples)
+    U = volume * np.array([*(a * densities.T), np.zeros(samples), energies.sum(axis=0), a1])
+    swept, mixed = np.array([volume, *(volume * energies)]), np.empty((samples, len(U) + 1))
+    where, alone, shape = np.arange(samples), np.empty((samples, 0), np.int8), np.array([1, 1, samples])
+    built = cpu.build([mix], model.constants | {"LANES": 16}, model.bindings)
+    master, offsets = np.zeros(samples, np.int8), np.empty((0, 1), np.int64)
+    given = (U.ravel(), swept.ravel(), np.ones(samples), master, offsets, np.array([1, samples, samples]), shape)
+    built.mix(0, -(-samples // 16), where, alone, mixed, *given)
+    exact = exact_change(first, second)
+    free = (a1 + exact > 1.01 * TRACE) & (a1 + exact < 1.0 - 1.01 * TRACE)
+    off = abs(mixed[:, len(U) - 1] - a1 - exact)
+    assert free.mean() > 0.9
+    assert np.all(off[free] <= 1e-10 * smaller_fraction(exact, first, second)[free] + np.finfo(float).eps)
+
+
+@pytest.mark.parametrize("pair", WITH_JWL, ids="-".join)
+def test_traces_at_their_bound_are_settled(pair):
+    """There is nothing to halve where a phase of the least fraction would give way further."""
+    a1, pressures, densities = draw(pair, 0.3, SAMPLES)
+    a1 = np.where(pressures[:, 0] < pressures[:, 1], TRACE, 1.0 - TRACE)
+    change, settled = np.empty((2, SAMPLES))
+    kernels(pair).relax_all(a1, pressures, densities, pressures.min(axis=1), False, change, settled)
+    assert np.all(abs(change) < 1e-16) and np.all(settled > 0.0)
 
 
 def smaller_fraction(exact, first, second):
@@ -232,10 +266,11 @@ def test_relaxation_moves_towards_the_exact_state_from_any_imbalance(pair):
 @pytest.mark.parametrize("pair", [("air", "water"), ("water", "tnt"), ("air", "tnt")], ids="-".join)
 def test_the_order_of_the_phases_does_not_matter(pair):
     a1, pressures, densities = draw(pair, 1.0, SAMPLES)
-    there, back = np.empty_like(a1), np.empty_like(a1)
+    there, back, settled = np.empty((3, SAMPLES))
     p_n = pressures.min(axis=1)
-    kernels(pair).relax_all(a1, pressures, densities, p_n, False, there)
-    kernels(pair[::-1]).relax_all(1.0 - a1, pressures[:, ::-1].copy(), densities[:, ::-1].copy(), p_n, False, back)
+    kernels(pair).relax_all(a1, pressures, densities, p_n, False, there, settled)
+    pressures, densities = pressures[:, ::-1].copy(), densities[:, ::-1].copy()
+    kernels(pair[::-1]).relax_all(1.0 - a1, pressures, densities, p_n, False, back, settled)
     assert np.all(abs(there + back) <= 1e-9 * np.minimum(a1 + there, 1.0 - a1 - there))
 
 
@@ -246,8 +281,8 @@ def test_a_falling_pressure_is_held_before_it_vanishes(pair):
     p_n = pressures.max(axis=1)
     pressures[::2, 0] = -10.0 * p_n[::2] - 1e10
     pressures[1::2, 1] = -10.0 * p_n[1::2] - 1e10
-    change = np.empty_like(a1)
-    kernels(pair).relax_all(a1, pressures, densities, p_n, True, change)
+    change, settled = np.empty((2, SAMPLES))
+    kernels(pair).relax_all(a1, pressures, densities, p_n, True, change, settled)
     assert np.all((a1 + change > 0.0) & (a1 + change < 1.0))
 
 

@@ -8,9 +8,11 @@ phase energies. Cells are named as in kernels/coupling.py.
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.kernels.coupling import FLUID
 from distfsi.kernels.cut_geometry import SHUT, is_in_domain, opening, step_to
-from distfsi.physics.moving_wall import state_of, with_energies
+from distfsi.kernels.fluid import HALVINGS
+from distfsi.physics.moving_wall import state_before_relaxation, state_of, with_energies
+from distfsi.physics.relaxation import halved_range, range_of_change
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, LANES, PHASES, VARIABLES
+from distfsi.physics.symbols import DIMENSIONS, FINISHES, LANES, PHASES, VARIABLES
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
 SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
@@ -171,12 +173,24 @@ def look_around(begin, end, band, joined, above, master, offsets, steps, shape, 
 
 @row
 def states_row(Q, S, n):
-    """S = states of the n contents Q, behind which their volumes stand; values of a cell are LANES apart."""
+    """S = states of the n contents Q, behind which their volumes stand, and a negative value where phases have not
+    relaxed; values of a cell are LANES apart."""
     for i in range(n):
         content = tuple(load(Q, v * LANES + i) for v in static_range(VARIABLES + 2))
         state = state_of(content, load(Q, (VARIABLES + 2) * LANES + i))
-        for v in static_range(VARIABLES):
+        for v in static_range(VARIABLES + 1):
             store(S, v * LANES + i, state[v])
+
+
+@helper
+def relaxed_to_the_end(Q, i):
+    """Volume fraction at which both phases of the content in lane i have one pressure."""
+    content = tuple(load(Q, v * LANES + i) for v in static_range(VARIABLES + 2))
+    U, phases = state_before_relaxation(content, load(Q, (VARIABLES + 2) * LANES + i))
+    low, high = range_of_change(phases[1])
+    for _ in range(HALVINGS):
+        low, high = halved_range(phases, low, high)
+    return phases[1] + 0.5 * (low + high)
 
 
 @helper
@@ -192,7 +206,7 @@ def mix(begin, end, band, joined, mixed, U, swept, fraction, master, offsets, st
     """mixed (n, VARIABLES + 1) = state and volume of the band's cells, once those that belong together share theirs. An
     item is a box of LANES cells."""
     cells = shape[0] * shape[1] * shape[2]
-    total, Q, S = workspace(VARIABLES + 4), workspace((VARIABLES + 3) * LANES), workspace(VARIABLES * LANES)
+    total, Q, S = workspace(VARIABLES + 4), workspace((VARIABLES + 3) * LANES), workspace((VARIABLES + 1) * LANES)
     for box in range(begin, end):
         lanes = min(LANES, len(band) - box * LANES)
         for i in range(lanes):
@@ -217,6 +231,9 @@ def mix(begin, end, band, joined, mixed, U, swept, fraction, master, offsets, st
         for i in range(lanes):
             for v in range(VARIABLES):
                 mixed[box * LANES + i, v] = load(S, v * LANES + i)
+            if FINISHES:
+                if load(S, VARIABLES * LANES + i) < 0.0:
+                    mixed[box * LANES + i, VARIABLES - 1] = relaxed_to_the_end(Q, i)
 
 
 @driver

@@ -101,23 +101,29 @@ def stage_content(U_n, U, v_n, v, D, swept, b, dt):
         )
 
 
-def state_of(Q, volume):
-    """State of a content that fills `volume`; two phases relax to one pressure."""
+def state_before_relaxation(Q, volume):
+    """State of a content that fills `volume`, and where both phases stand (relaxation.py)."""
     U = tuple(Q[v] / volume for v in static_range(VARIABLES))
+    a1 = min(max(U[3 + DIMENSIONS], MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
+    a2 = 1.0 - a1
+    W = primitives((*(U[v] for v in static_range(VARIABLES - 1)), a1))
+    p = W[2 + DIMENSIONS]
+    ref1, slope1 = reference_1(W[0])
+    ref2, slope2 = reference_2(W[1])
+    excess1 = OMEGA_1 * (Q[VARIABLES] / volume) - a1 * (p - ref1)
+    excess2 = OMEGA_2 * (Q[VARIABLES + 1] / volume) - a2 * (p - ref2)
+    return (U, phases_before(p, a1, 0.0, U[0], U[1], ref1, ref2, excess1, excess2))
+
+
+def state_of(Q, volume):
+    """State of a content that fills `volume`; two phases relax to one pressure, unless what follows is negative."""
     if PHASES == 1:
-        return U
+        return (*(Q[v] / volume for v in static_range(VARIABLES)), 0.0)
     else:
-        a1 = min(max(U[3 + DIMENSIONS], MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-        a2 = 1.0 - a1
-        W = primitives((*(U[v] for v in static_range(VARIABLES - 1)), a1))
-        p = W[2 + DIMENSIONS]
-        ref1, slope1 = reference_1(W[0])
-        ref2, slope2 = reference_2(W[1])
-        excess1 = OMEGA_1 * (Q[VARIABLES] / volume) - a1 * (p - ref1)
-        excess2 = OMEGA_2 * (Q[VARIABLES + 1] / volume) - a2 * (p - ref2)
-        change, settled = relaxed_fraction_change(phases_before(p, a1, 0.0, U[0], U[1], ref1, ref2, excess1, excess2))
-        relaxed = min(max(a1 + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-        return (*(U[v] for v in static_range(VARIABLES - 1)), relaxed)
+        U, phases = state_before_relaxation(Q, volume)
+        change, settled = relaxed_fraction_change(phases)
+        a1 = min(max(phases[1] + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
+        return (*(U[v] for v in static_range(VARIABLES - 1)), a1, settled)
 
 
 def normal_of(area):

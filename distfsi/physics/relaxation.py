@@ -97,9 +97,10 @@ def relaxed_fraction_change(phases):
         change = min(max(change, lowest), highest)
         for _ in static_range(REFITS):
             now1, stiff1, now2, stiff2 = phases_after(phases, change)
+            before = change
             further = fraction_change_of_fit(k1 + change, now1, stiff1, k2 - change, now2, stiff2)
-            change = min(max(change + further, lowest), highest)
-        return (change, SETTLED * max(min(a1 + change, a2 - change), TRACE) - abs(further))
+            change = min(max(before + further, lowest), highest)
+        return (change, SETTLED * max(min(a1 + change, a2 - change), TRACE) - abs(change - before))
 
 
 def halved_range(phases, low, high):
