@@ -627,6 +627,30 @@ def test_a_cloud_of_debris_that_flies_apart_turns_to_dust(phases):
     assert (case.grid_of(case.coupling.wall.fractions[1].here()) == 1.0).all()
 
 
+def test_gas_fills_the_room_of_a_wall_that_turns_to_dust_at_once():
+    """A square of debris in gas at rest: fifteen steps later a seventh of its room is left, and then a tenth.
+    Pressures, half of that of the gas meanwhile, become its own again."""
+    h = 0.025
+    places = 0.5 + 0.5 * h * (np.stack(np.meshgrid(*[np.arange(10)] * 2), -1).reshape(-1, 2) - 5.0)
+    cloud = [speck(tuple(x), 0.5 * h, 30.0, (0.0, 0.0)) for x in places]
+    region = [(gas(1.4, 1.0, (0.0, 0.0)), None)]
+    case = coupled(
+        cloud, region, (0.0, 0.0), (1.0, 1.0), (40, 40), (OPEN, OPEN), block=20, form="total_lagrangian", cfl=0.6
+    )
+    before, missing = case.balance(), (1.0 - volumes(case)).sum()
+    assert missing > 20.0
+    case.solid.columns["dust"][:] = 1
+    while case.simulation.time < 1.5:
+        case.step()
+        held = volumes(case) > 0.0
+        pressure = primitives(case)[3, held]
+        assert pressure.min() > 0.5 and pressure.max() < 1.3
+        if case.simulation.steps == 15:
+            assert (1.0 - volumes(case)).sum() < 0.15 * missing
+    assert volumes(case).min() > 0.949 and np.abs(pressure - 1.0).max() < 1e-2
+    assert np.abs(case.balance() - before).max() < 1e-12
+
+
 # ---- restart --------------------------------------------------------------------------------------------------------
 
 

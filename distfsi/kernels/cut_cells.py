@@ -12,11 +12,13 @@ from distfsi.kernels.fluid import HALVINGS
 from distfsi.physics.moving_wall import state_before_relaxation, state_of, with_energies
 from distfsi.physics.relaxation import halved_range, range_of_change
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, FINISHES, LANES, PHASES, VARIABLES
+from distfsi.physics.symbols import DIMENSIONS, FINISHES, LANES, PHASES, VARIABLES, bulk_modulus, primitives
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
 SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
 GIVEN = 0.125  # of its volume: the most that a cell gives to a neighbour at a time
+LACKING = 0.05  # of a whole cell: what may be missing to its volume
+YIELDED = 0.05  # of its pressure: what a cell loses at a time when it fills what is missing
 
 # ---- contents -------------------------------------------------------------------------------------------------------
 
@@ -283,12 +285,28 @@ def opposite(kind, swept, fraction, old, new, at, sign, cells, steps, index, gri
     return total
 
 
+@helper
+def expand(mixed, n):
+    """The fluid of a whole cell fills what is missing in it, and loses no more than YIELDED of its pressure."""
+    state, volume = tuple(mixed[n, v] for v in static_range(VARIABLES)), mixed[n, VARIABLES]
+    missing = 1.0 - LACKING - volume
+    if missing > 0.0:
+        W = primitives(state)
+        gained = max(min(missing, volume * (YIELDED * W[PHASES + DIMENSIONS] / bulk_modulus(W))), 0.0)
+        for v in static_range(PHASES + DIMENSIONS + 1):
+            mixed[n, v] = state[v] * (volume / (volume + gained))
+        mixed[n, VARIABLES] = volume + gained
+
+
 @driver
 def exchange_volumes(
-    begin, end, uneven, mixed, U, swept, kind, fraction, old, new, steps, shape, origin, grid_cells
+    begin, end, uneven, mixed, U, swept, kind, fraction, old, new, expands, steps, shape, origin, grid_cells
 ):  # fmt: skip
     """mixed (n, VARIABLES + 1) = state and volume of cells, among them all with too much or too little, after those
-    with too much have given to their neighbours with too little, with the content that belongs to it."""
+    with too much have given to their neighbours with too little, with the content that belongs to it.
+
+    What is missing in whole cells all the same their own fluid fills, if it `expands`.
+    """
     cells = shape[0] * shape[1] * shape[2]
     total = workspace(VARIABLES)
     for n in range(begin, end):
@@ -329,3 +347,5 @@ def exchange_volumes(
         for v in static_range(VARIABLES):
             mixed[n, v] = total[v] / (volume + gained) if gained != 0.0 else state[v]
         mixed[n, VARIABLES] = volume + gained
+        if expands > 0 and kind[at] == FLUID and load(fraction, at) == 1.0:
+            expand(mixed, n)

@@ -99,9 +99,8 @@ class CutCells:
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         real = np.dtype(scene.fluid.precision).type
-        self.wall = WallGeometry(
-            blocks, team, max(body.spacing for body in scene.solid.bodies), real, scene.coupling.scheme == "stairs"
-        )
+        self._stairs = scene.coupling.scheme == "stairs"
+        self.wall = WallGeometry(blocks, team, max(body.spacing for body in scene.solid.bodies), real, self._stairs)
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes})
         self.fluid_kernels = team.build(
             FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
@@ -197,6 +196,7 @@ class CutCells:
         team, D = self.team, self._dimensions
         self._thickness.way += self._look(self.solid.start)
         self.dust.find(self.solid.columns, self._middle, self._middle_bins)
+        self._lone = self.dust.rows(self.solid.columns)
         self._cut(self.solid.start, self.solid.carried)
         self._find_company()
         n = self._band.shape[0]
@@ -255,7 +255,7 @@ class CutCells:
             for cells, mixed in lists:
                 self.team.run(
                     k.exchange_volumes, cells.shape[0], cells, mixed, U, self._swept, self._kinds, after, *wall.faces,
-                    wall.steps, wall.shape, wall.origin, wall.cells,
+                    self._expands, wall.steps, wall.shape, wall.origin, wall.cells,
                 )  # fmt: skip
             for cells, mixed in lists:
                 self.team.run(k.put_mixed, cells.shape[0], cells, mixed, U, self._swept, wall.shape)
@@ -280,8 +280,8 @@ class CutCells:
         )  # fmt: skip
         for cells in (self._band, *self._near_ghosts.cells):
             self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
-        rows = self.dust.rows(self.solid.columns)
-        self._dragged = self.drag(rows, given) if rows.shape[0] else np.zeros((self.blocks.local_count, D + 1))
+        paid = np.zeros((self.blocks.local_count, D + 1))
+        self._dragged = self.drag(self._lone, given) if self._lone.shape[0] else paid
         return given
 
     def drag(self, rows: Any, impulse: Any) -> np.ndarray:
@@ -404,8 +404,11 @@ class CutCells:
         self._run(self.fluid_kernels.take_contents, self.fluid.there, self._swept, self.wall.shape)
         mark = self.team.empty(self._band.shape[0], np.int8)
         self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
-        if self.blocks.communicator.maximum(np.array([float(self._particles.rows.any(mark))]))[0] > 0.0:
+        found = np.array([float(self._particles.rows.any(mark)), float(self._lone.shape[0])])
+        leaving, lone = self.blocks.communicator.maximum(found)
+        if leaving > 0.0:
             self.evict()
+        self._expands = int(lone > 0.0 and not self._stairs)
         self._look_around()
 
     def evict(self) -> None:
