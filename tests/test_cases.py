@@ -9,7 +9,7 @@ from distfsi.__main__ import STUDIES, parser
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.scene import load
-from distfsi.study import shock_bubble, shock_bubble_speed, undex_2d
+from distfsi.study import fitted_cylinder, liftoff, shock_bubble, shock_bubble_speed, undex_2d
 from distfsi.study.references import SHOCK_BUBBLE_SPEEDS, UNDEX_2D
 from distfsi.study.tracks import crossing, velocity, write_tracks
 
@@ -133,6 +133,37 @@ def test_shock_and_bubble(tmp_path, monkeypatch):
     experiment = shock_bubble.SHOCK_BUBBLE[0]
     for name in ("Vs", "VR", "VT", "Vui", "Vdi", "Vj"):
         assert found[name] == pytest.approx(getattr(experiment, name), rel=0.1), name
+
+
+# ---- a cylinder that a shock throws ---------------------------------------------------------------------------------
+
+
+def test_the_fitted_meshes_agree_with_finer_ones_of_their_own():
+    """And the channel's wall matters only when its echo is back."""
+    for mesh in (fitted_cylinder.unbounded, fitted_cylinder.channel):
+        coarse, fine = (fitted_cylinder.fly(mesh(n), 10.77, 0.08) for n in (25, 50))
+        assert coarse.x[-1] - 0.15 == pytest.approx(fine.x[-1] - 0.15, rel=0.01)
+    free, shut_in = (
+        fitted_cylinder.fly(mesh(25), 10.77, 0.02) for mesh in (fitted_cylinder.unbounded, fitted_cylinder.channel)
+    )
+    assert free.u[-1] == pytest.approx(shut_in.u[-1], rel=0.01)
+
+
+THROWN = [
+    ("unbounded gas", 0.1, (0.5, 0.2)),
+    *(pytest.param(name, 0.30085, None, marks=pytest.mark.full) for name in liftoff.SURROUNDINGS),
+]
+
+
+@pytest.mark.parametrize(("name", "end", "upper"), THROWN)
+def test_a_shock_throws_a_cylinder_as_on_a_fitted_mesh(name, end, upper):
+    """20 cells across; the path is of first order: 3 % with 10, 0.5 % with 40."""
+    around = liftoff.SURROUNDINGS[name]
+    around = around._replace(upper=upper) if upper else around
+    found = liftoff.throw(Communicator(), around, 20, [f"time.end={end}"])
+    fitted = liftoff.flight(around, end, 50)
+    assert found["x"][-1] - 0.15 == pytest.approx(fitted["x"][-1] - 0.15, rel=0.015)
+    assert found["u"][-1] == pytest.approx(fitted["u"][-1], rel=0.02)
 
 
 def test_the_papers_table_2_counts_the_cells_of_its_own_meshes():

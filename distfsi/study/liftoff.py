@@ -1,9 +1,12 @@
-"""A shock lifts a cylinder off the floor: where its centre is, at three resolutions, beside others."""
+"""A shock lifts a cylinder off the floor: where its centre is, at three resolutions, beside others.
+
+And away from the floor, where it flies along x only, beside computations on meshes fitted to its wall."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +14,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
 from distfsi.simulation import Simulation
+from distfsi.study import fitted_cylinder
 from distfsi.study.references import LIFTOFF
 from distfsi.study.tracks import Measure, Tracks, follow, write_tracks
 
@@ -18,6 +22,24 @@ INPUT = Path(__file__).parents[2] / "inputs" / "liftoff.toml"
 DIRECTORY = Path("out/study_liftoff")
 CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many particles
 STEPS_BETWEEN_SAMPLES = 5
+CYLINDER_CELLS = (10, 20, 40)  # across the cylinder away from the floor
+FITTED_CELLS = 100  # around half of it
+
+
+class Surroundings(NamedTuple):
+    """What is around a cylinder whose axis lies on the low side: the domain's corners, what its high side is, and
+    the mesh of the other computation. Long enough that nothing comes back from the ends."""
+
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    high_side: str
+    mesh: Callable[[int], np.ndarray]
+
+
+SURROUNDINGS = {
+    "unbounded gas": Surroundings((-0.1, 0.0), (1.0, 0.35), "outflow", fitted_cylinder.unbounded),
+    "half a channel": Surroundings((-0.6, 0.0), (1.2, 0.1), "wall", fitted_cylinder.channel),
+}
 
 
 def measure_of(simulation: Simulation) -> Measure:
@@ -37,6 +59,29 @@ def run(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tra
     scene = load(INPUT, [*size, f'output.directory="{DIRECTORY / str(cells)}"', *overrides])
     times = [instant.time for instant in LIFTOFF]
     return follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
+
+
+def throw(communicator: Communicator, around: Surroundings, cells: int, overrides: Sequence[str] = ()) -> Tracks:
+    """The tracks of the upper half of a cylinder with so many cells across, which flies along x. Collective."""
+    h = 0.1 / cells
+    (left, low), (right, high) = around.lower, around.upper
+    settings = [
+        f"domain.lower=[{left},{low}]",
+        f"domain.upper=[{right},{high}]",
+        f"domain.cells=[{round((right - left) / h)},{round((high - low) / h)}]",
+        f'domain.y=["symmetry","{around.high_side}"]',
+        f"fluid.regions.1.shape.lower=[{left},{low}]",
+        f"fluid.regions.1.shape.upper=[{fitted_cylinder.SHOCK_START},{high}]",
+        f"solid.bodies.cylinder.shape.center=[{fitted_cylinder.CENTRE},{low}]",
+        f"solid.bodies.cylinder.spacing={0.5 * h!r}",
+    ]
+    return follow(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
+
+
+def flight(around: Surroundings, end: float, cells: int = FITTED_CELLS) -> Tracks:
+    """The same by the other computation, with so many cells around half the cylinder."""
+    (body,) = load(INPUT).solid.bodies
+    return fitted_cylinder.fly(around.mesh(cells), body.density, end)._asdict()
 
 
 def centres(tracks: Tracks) -> list[tuple[float, float]]:
@@ -67,12 +112,15 @@ def draw(runs: Mapping[int, Tracks]) -> None:
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
     """Coarse cells until the first time."""
-    _study(communicator, CELLS_ACROSS[:1], [f"time.end={LIFTOFF[0].time}", *overrides])
+    until = f"time.end={LIFTOFF[0].time}"
+    _study(communicator, CELLS_ACROSS[:1], [until, *overrides])
+    _compare(communicator, CYLINDER_CELLS[:1], [until, *overrides])
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     """All resolutions; print the places of the centre, leave tracks, charts and fields in DIRECTORY."""
     _study(communicator, CELLS_ACROSS, overrides)
+    _compare(communicator, CYLINDER_CELLS, overrides)
 
 
 def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
@@ -87,3 +135,20 @@ def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence
     for cells, tracks in runs.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"tracks, charts and fields in {DIRECTORY}", flush=True)
+
+
+def _compare(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
+    """Print how far the cylinder has come away from the floor, and its velocity, at the times of the references."""
+    for name, around in SURROUNDINGS.items():
+        runs = {f"{n} cells across": throw(communicator, around, n, overrides) for n in sizes}
+        if communicator.rank > 0:
+            continue
+        end = next(iter(runs.values()))["time"][-1]
+        runs = {"fitted mesh": flight(around, end), **runs}
+        times = [r.time for r in LIFTOFF if r.time <= end * (1.0 + 1e-9)]
+        print(f"{name + ': path, speed at':>24}" + "".join(f"   t = {time:<14g}" for time in times))
+        for label, t in runs.items():
+            found = (
+                (np.interp(time, t["time"], t["x"]) - t["x"][0], np.interp(time, t["time"], t["u"])) for time in times
+            )
+            print(row(label, list(found)), flush=True)
