@@ -9,7 +9,7 @@ from distfsi.__main__ import STUDIES, parser
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.scene import load
-from distfsi.study import fitted_cylinder, liftoff, shock_bubble, shock_bubble_speed, undex_2d
+from distfsi.study import fitted_cylinder, fitted_liftoff, liftoff, shock_bubble, shock_bubble_speed, undex_2d
 from distfsi.study.references import SHOCK_BUBBLE_SPEEDS, UNDEX_2D
 from distfsi.study.tracks import crossing, velocity, write_tracks
 
@@ -149,6 +149,31 @@ def test_the_fitted_meshes_agree_with_finer_ones_of_their_own():
     assert free.u[-1] == pytest.approx(shut_in.u[-1], rel=0.01)
 
 
+def test_the_fitted_mesh_between_floor_and_ceiling_is_twice_half_a_channel():
+    whole = fitted_liftoff.lift(fitted_cylinder.HEIGHT - 0.05, 10.77, 0.1, 25)
+    half = fitted_cylinder.fly(fitted_cylinder.channel(25), 10.77, 0.1)
+    assert whole.x[-1] - 0.15 == pytest.approx(half.x[-1] - 0.15, rel=0.01)
+    assert abs(whole.y[-1] - 0.1) < 5e-4  # there are fewer rows below than above
+
+
+@pytest.mark.full
+def test_a_shock_lifts_a_cylinder_off_the_floor(tmp_path, monkeypatch):
+    """Twenty cells across; others by a ghost-cell method."""
+    monkeypatch.setattr(liftoff, "DIRECTORY", tmp_path)
+    for found, other in zip(liftoff.centres(liftoff.run(Communicator(), 40, ())), liftoff.LIFTOFF, strict=True):
+        assert found[0] == pytest.approx(other.x, rel=0.03)
+        assert found[1] == pytest.approx(other.y, rel=0.05)
+
+
+@pytest.mark.full
+def test_a_shock_lifts_a_cylinder_as_on_a_fitted_mesh(tmp_path, monkeypatch):
+    """From a hundredth above the floor, two cells; the height is of first order."""
+    monkeypatch.setattr(liftoff, "DIRECTORY", tmp_path)
+    found, fitted = liftoff.run_raised(Communicator(), 40, ["time.end=0.1"]), liftoff.lift_raised(0.1, 25)
+    assert found["x"][-1] - 0.15 == pytest.approx(fitted["x"][-1] - 0.15, rel=0.02)
+    assert found["y"][-1] - 0.05 == pytest.approx(fitted["y"][-1] - 0.05, rel=0.05)
+
+
 THROWN = [
     ("unbounded gas", 0.1, (0.5, 0.2)),
     *(pytest.param(name, 0.30085, None, marks=pytest.mark.full) for name in liftoff.SURROUNDINGS),
@@ -156,8 +181,9 @@ THROWN = [
 
 
 @pytest.mark.parametrize(("name", "end", "upper"), THROWN)
-def test_a_shock_throws_a_cylinder_as_on_a_fitted_mesh(name, end, upper):
+def test_a_shock_throws_a_cylinder_as_on_a_fitted_mesh(tmp_path, monkeypatch, name, end, upper):
     """20 cells across; the path is of first order: 3 % with 10, 0.5 % with 40."""
+    monkeypatch.setattr(liftoff, "DIRECTORY", tmp_path)
     around = liftoff.SURROUNDINGS[name]
     around = around._replace(upper=upper) if upper else around
     found = liftoff.throw(Communicator(), around, 20, [f"time.end={end}"])

@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from distfsi.device.emit import plain
+from distfsi.kernels.coupling import FLUID
 from distfsi.kernels.cut_geometry import SHUT
 from distfsi.parts import solid as solid_part
 from distfsi.parts.wall_geometry import plane_profile
@@ -527,6 +528,24 @@ def test_a_pocket_that_is_covered_keeps_its_gas():
         assert positive(case)
         assert before_piston() == pytest.approx(mass, rel=1e-13)
     assert covered > 5 and sealed[0] == sealed[-1] == 0.0 and max(sealed) == pytest.approx(mass, rel=1e-13)
+
+
+@pytest.mark.parametrize(("cfl", "flows"), [(0.5, True), (0.9, False)])
+def test_gas_flows_through_a_gap_that_is_wide_enough_for_the_step(cfl, flows):
+    """0.4 cells: between two walls a step bears no less than cfl / D; what is narrower is shut."""
+    plate = rigid(Box((0.2, 0.02), (0.8, 0.42)), 0.025, (0.0, 0.0))
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 2.0, (0, 0)), Box((0.0, 0.0), (0.1, 1.0)))]
+    case = coupled([plate], regions, (0.0, 0.0), (1.0, 0.5), (20, 10), block=20, cfl=cfl, runge_kutta="rk2")
+    before = case.balance()[0]
+    for _ in range(60):
+        case.step()
+        assert positive(case)
+    inside = (0, 0, slice(6, 14))
+    assert (case.grid_of(case.coupling.kind.here())[0][inside] == FLUID).all() == flows
+    if flows:
+        u, v = primitives(case)[1:3]
+        assert np.abs(u[inside]).max() > 0.1 and np.abs(v[inside]).max() < 0.01
+    assert abs(case.balance()[0] - before) < 1e-13
 
 
 @pytest.mark.full

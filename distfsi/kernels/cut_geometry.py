@@ -11,7 +11,7 @@ from distfsi.kernels.coupling import COVERED, DEEP, FLUID, cell_at, cells_of_row
 from distfsi.kernels.wall_distance import CUT, corner_at
 from distfsi.physics.apertures import open_cell, open_face
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS
+from distfsi.physics.symbols import DIMENSIONS, LEAST_ALONE
 from distfsi.physics.tensors import dot
 
 NEEDY = 0.5  # of a cell: with less the fluid in it joins a neighbour
@@ -165,9 +165,9 @@ def smaller(old, new, at):
 
 
 @helper
-def is_needy(fraction_old, fraction_new, swept, at, share):
-    """Whether the fluid in a cell has to join a neighbour's: it has little room, or fills little of it."""
-    return min(smaller(fraction_old, fraction_new, at), load(swept, share)) < NEEDY
+def room(fraction_old, fraction_new, swept, at, share):
+    """How much of a cell its fluid has, before and after the step: the least of what is open and what it fills."""
+    return min(smaller(fraction_old, fraction_new, at), load(swept, share))
 
 
 @row
@@ -176,7 +176,7 @@ def flow_row(kind, fraction_old, fraction_new, swept, at, share, n):
     count = 0
     for i in range(n):
         store(kind, at + i, FLUID)
-        count += 1 if is_needy(fraction_old, fraction_new, swept, at + i, share + i) else 0
+        count += 1 if room(fraction_old, fraction_new, swept, at + i, share + i) < NEEDY else 0
     return count
 
 
@@ -217,8 +217,8 @@ def find_masters(
 ):  # fmt: skip
     """master (blocks, D, Z, Y, X) = where the fluid of a needy cell finds its company, 0 if nowhere or not needy.
 
-    kind: FLUID if a cell has enough fluid or company, SHUT if it has little and none, else COVERED. swept (blocks,
-    fields, …): first the volume of the fluid.
+    kind: FLUID if a cell has company or enough fluid to stand alone, SHUT if it has less and none, else COVERED.
+    swept (blocks, fields, …): first the volume of the fluid.
     offsets (n, D): the neighbours in the order in which they are asked; sequences (n, D): ways through the axes.
     """
     cells = shape[0] * shape[1] * shape[2]
@@ -231,7 +231,8 @@ def find_masters(
         for i in range(n if flow_row(kind, fraction_old, fraction_new, swept, at, share, n) > 0 else 0):
             at = cell_at(b, i, j, k, shape)
             share, first = at + b * (fields - 1) * cells, at + b * (DIMENSIONS - 1) * cells
-            if not is_needy(fraction_old, fraction_new, swept, at, share):
+            own = room(fraction_old, fraction_new, swept, at, share)
+            if own >= NEEDY:
                 continue
             index = (origin[b, 0] + i, origin[b, 1] + j, origin[b, 2] + k)
             grad = tuple(slope_of_fraction(fraction_old, fraction_new, at, steps[d]) for d in static_range(DIMENSIONS))
@@ -241,7 +242,7 @@ def find_masters(
                 if not is_in_domain(index, offsets[m], grid_cells):
                     continue
                 step = step_to(offsets, m, steps)
-                if is_needy(fraction_old, fraction_new, swept, at + step, share + step):
+                if room(fraction_old, fraction_new, swept, at + step, share + step) < NEEDY:
                     continue
                 away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
                 length = sqrt(dot(away, away))
@@ -260,7 +261,7 @@ def find_masters(
                     master[first + d * cells] = offsets[chosen, d]
             elif load(swept, share) <= 0.0:
                 kind[at] = COVERED
-            else:
+            elif own < LEAST_ALONE:
                 kind[at] = SHUT
 
 

@@ -100,7 +100,8 @@ class CutCells:
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         real = np.dtype(scene.fluid.precision).type
         self._stairs = scene.coupling.scheme == "stairs"
-        self.wall = WallGeometry(blocks, team, max(body.spacing for body in scene.solid.bodies), real, self._stairs)
+        coarsest = max(body.spacing for body in scene.solid.bodies)
+        self.wall = WallGeometry(blocks, team, coarsest, real, scene.time.cfl, self._stairs)
         self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes})
         self.fluid_kernels = team.build(
             FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision

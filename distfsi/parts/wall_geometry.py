@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import permutations, product
 from math import prod, sqrt
 from types import SimpleNamespace
@@ -76,6 +77,16 @@ def _columns(values: Any) -> tuple[Any, int]:
     return values.reshape(-1), values.shape[1]
 
 
+def least_alone(spacing: Sequence[float], cfl: float) -> float:
+    """The narrowest gap, in cells of a `spacing` [m], in which fluid between two walls is stable by itself.
+
+    What the walls take of its momentum in a step is 2 c dt / gap, of which Runge-Kutta methods bear 2; the CFL number
+    bounds the sum of c dt / h over the axes.
+    """
+    rates = [1.0 / h for h in spacing]
+    return cfl * max(rates) / sum(rates)
+
+
 class WallGeometry:
     """Open parts of cells and faces, before and after a step; arrays are the device's.
 
@@ -90,14 +101,13 @@ class WallGeometry:
     radius     [m] of the kernel; seen [m]: how far from a cell's center particles may be that make its wall
     """
 
-    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type, stairs: bool):
+    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type, cfl: float, stairs: bool):
         """`spacing` [m] of the coarsest particles; `stairs`: cells are open as a whole or not at all."""
         self._stairs = stairs
         self.blocks, self.team, D = blocks, team, blocks.grid.dimensions
         self.lanes = min(team.lanes, NEAR_LANES)
-        self.kernels: SimpleNamespace = team.build(
-            (*DRIVERS, *(STAIRS if stairs else ())), {"DIMENSIONS": D, "LANES": self.lanes}
-        )
+        constants = {"DIMENSIONS": D, "LANES": self.lanes, "LEAST_ALONE": least_alone(blocks.grid.spacing[:D], cfl)}
+        self.kernels: SimpleNamespace = team.build((*DRIVERS, *(STAIRS if stairs else ())), constants)
         grid, h = blocks.grid, max(blocks.grid.spacing[: blocks.grid.dimensions])
         self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
         self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h

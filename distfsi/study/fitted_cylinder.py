@@ -122,14 +122,14 @@ class _Mesh:
     def _through(self, w: Array, far: Array, axis: int) -> Array:
         """What goes through the faces across an axis of the mesh, which is the first of the states' two."""
         normal, (low_wall, high_wall) = self.normals[axis], self.walls[axis]
-        low_ghost = w[:, :1] - _safe(w[:, :1], w[:, 1:2] - w[:, :1]) if low_wall else far[:, :1]
-        high_ghost = w[:, -1:] + _safe(w[:, -1:], w[:, -1:] - w[:, -2:-1]) if high_wall else far[:, -1:]
-        low, high = _face_values(np.concatenate([low_ghost, w, high_ghost], axis=1))  # slopes at walls are one-sided
+        low_ghost, high_ghost = one_sided(w)
+        low_ghost, high_ghost = low_ghost if low_wall else far[:, :1], high_ghost if high_wall else far[:, -1:]
+        low, high = face_values(np.concatenate([low_ghost, w, high_ghost], axis=1))
         if low_wall:
-            low[:, 0] = _mirrored(high[:, 0], *normal[:, 0])
+            low[:, 0] = mirrored(high[:, 0], *normal[:, 0])
         if high_wall:
-            high[:, -1] = _mirrored(low[:, -1], *normal[:, -1])
-        return _flux(low, high, *normal) * self.lengths[axis]
+            high[:, -1] = mirrored(low[:, -1], *normal[:, -1])
+        return flux(low, high, *normal) * self.lengths[axis]
 
 
 def _against(q: Array, speed: float) -> Array:
@@ -138,7 +138,7 @@ def _against(q: Array, speed: float) -> Array:
     return np.array([q[0], u - speed, v, (GAMMA - 1.0) * (q[3] - 0.5 * q[0] * (u**2 + v**2))])
 
 
-def _face_values(w: Array) -> tuple[Array, Array]:
+def face_values(w: Array) -> tuple[Array, Array]:
     """States on both sides of the faces between cells along the first axis, from cells and a ghost at each end."""
     change = np.diff(w, axis=1)
     a, b = change[:, :-1], change[:, 1:]
@@ -150,18 +150,23 @@ def _face_values(w: Array) -> tuple[Array, Array]:
     return low, high
 
 
+def one_sided(w: Array) -> tuple[Array, Array]:
+    """Ghosts at both ends that make the slopes there one-sided, or none where density or pressure might lose half."""
+    low, high = w[:, 1:2] - w[:, :1], w[:, -1:] - w[:, -2:-1]
+    return w[:, :1] - _safe(w[:, :1], low), w[:, -1:] + _safe(w[:, -1:], high)
+
+
 def _safe(w: Array, slope: Array) -> Array:
-    """The slope, or none where half of it would take more than half of the density or the pressure."""
-    return np.where(((slope < w) & (slope > -w))[[0, 3]].all(axis=0), slope, 0.0)
+    return np.where((np.abs(slope) < w)[[0, 3]].all(axis=0), slope, 0.0)
 
 
-def _mirrored(w: Array, nx: Array, ny: Array) -> Array:
+def mirrored(w: Array, nx: Array, ny: Array) -> Array:
     """The state behind a wall with the normal (nx, ny)."""
     normal = w[1] * nx + w[2] * ny
     return np.array([w[0], w[1] - 2.0 * normal * nx, w[2] - 2.0 * normal * ny, w[3]])
 
 
-def _flux(low: Array, high: Array, nx: Array, ny: Array) -> Array:
+def flux(low: Array, high: Array, nx: Array, ny: Array) -> Array:
     """HLLC flux along (nx, ny), with the wave speeds of Roe's averages (Einfeldt)."""
     (rho_l, u_l, v_l, p_l), (rho_r, u_r, v_r, p_r) = low, high
     n_l, n_r = u_l * nx + v_l * ny, u_r * nx + v_r * ny

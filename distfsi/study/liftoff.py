@@ -14,7 +14,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.study import fitted_cylinder
+from distfsi.study import fitted_cylinder, fitted_liftoff
 from distfsi.study.references import LIFTOFF
 from distfsi.study.tracks import Measure, Tracks, follow, write_tracks
 
@@ -24,6 +24,7 @@ CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many par
 STEPS_BETWEEN_SAMPLES = 5
 CYLINDER_CELLS = (10, 20, 40)  # across the cylinder away from the floor
 FITTED_CELLS = 100  # around half of it
+RAISED, RAISED_CELLS = 0.01, 50  # height above the floor of one that starts in gas, and cells around half of it
 
 
 class Surroundings(NamedTuple):
@@ -61,6 +62,19 @@ def run(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tra
     return follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
 
 
+def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tracks:
+    """As `run`, of a cylinder that starts above the floor. Collective."""
+    x, y = fitted_liftoff.START + (0.0, RAISED)
+    names = [f"solid.bodies.cylinder.shape.center=[{x},{y}]", f'output.directory="{DIRECTORY / f"raised_{cells}"}"']
+    return run(communicator, cells, [*names, *overrides])
+
+
+def lift_raised(end: float, cells: int = RAISED_CELLS) -> Tracks:
+    """The same by the other computation, with so many cells around half the cylinder."""
+    (body,) = load(INPUT).solid.bodies
+    return fitted_liftoff.lift(RAISED, body.density, end, cells)._asdict()
+
+
 def throw(communicator: Communicator, around: Surroundings, cells: int, overrides: Sequence[str] = ()) -> Tracks:
     """The tracks of the upper half of a cylinder with so many cells across, which flies along x. Collective."""
     h = 0.1 / cells
@@ -74,6 +88,7 @@ def throw(communicator: Communicator, around: Surroundings, cells: int, override
         f"fluid.regions.1.shape.upper=[{fitted_cylinder.SHOCK_START},{high}]",
         f"solid.bodies.cylinder.shape.center=[{fitted_cylinder.CENTRE},{low}]",
         f"solid.bodies.cylinder.spacing={0.5 * h!r}",
+        f'output.directory="{DIRECTORY / f"thrown_{cells}"}"',
     ]
     return follow(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
 
@@ -125,6 +140,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
 
 def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
     runs = {cells: run(communicator, cells, overrides) for cells in sizes}
+    raised = {cells: run_raised(communicator, cells, overrides) for cells in sizes[:2]}
     if communicator.rank > 0:
         return
     for cells, tracks in runs.items():
@@ -133,6 +149,10 @@ def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence
     print(f"{'centre (x, y) at':>24}" + "".join(f"   t = {r.time:<14g}" for r in LIFTOFF))
     print(row("others", [(r.x, r.y) for r in LIFTOFF]))
     for cells, tracks in runs.items():
+        print(row(f"h = {0.2 / cells:g}", centres(tracks)))
+    print(f"{'raised by ' + format(RAISED, 'g'):>24}")
+    print(row("fitted mesh", centres(lift_raised(runs[sizes[0]]["time"][-1]))))
+    for cells, tracks in raised.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"tracks, charts and fields in {DIRECTORY}", flush=True)
 
