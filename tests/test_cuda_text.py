@@ -54,8 +54,8 @@ def _name(module) -> str:
 
 
 def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, scheme: str, form: str):
-    """A ball of steel, fast and thick, a thin plate and a lone particle in a box of gas: cells get covered, deep and
-    fresh."""
+    """A ball of steel, fast and thick, a thin light plate and a lone particle in a box of gas: cells get covered, deep
+    and fresh."""
     D = dimensions
     path.write_text(
         f"""
@@ -83,7 +83,7 @@ velocity = {[3000, 500, 250][:D]}
 [solid.bodies.plate]
 shape = {{ kind = "box", lower = {["1.4 mm", *["2 mm"] * (D - 1)]}, upper = {["2.1 mm", *["14 mm"] * (D - 1)]} }}
 spacing = "0.7 mm"
-{STEEL}
+{STEEL.replace("7830", "300" if scheme != "paper" else "7830")}
 [solid.bodies.speck]
 shape = {{ kind = "box", lower = {["14 mm"] * D}, upper = {["14.7 mm"] * D} }}
 spacing = "0.7 mm"

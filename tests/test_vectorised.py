@@ -90,35 +90,42 @@ def test_without_the_promise_of_no_alias_rows_are_scalar(row):
     assert count(code, "mul", "pd", WIDE) == 0
 
 
-POINTS = (
-    wall_distance.add_balls,
-    cut_forces.see_particles,
-    push.push,
+POINTS = (wall_distance.add_balls, cut_forces.see_particles, push.gather_kicks)
+INTEGERS = (
+    "order",
+    "start",
+    "low",
+    "window",
+    "strides",
+    "chosen",
+    "band",
+    "walled",
+    "shape",
+    "cells",
+    "home",
+    "grid_cells",
 )
-INTEGERS = ("order", "start", "low", "window", "strides", "chosen", "band", "walled", "shape", "cells", "home")
-TABLES = {"position": 2, "filled": 2, "ball": 2, "mean": 2, "image": 2, "impulse": 2, "origin": 2, "extent": 2}
-SCALARS = {"begin": 0, "end": 0, "columns": 1, "giver": 1, "size": 1.0, "radius": 1.0, "largest": 1.0, "reach": 1.0}
-SCALARS |= {"thin": 1.0, "thick": 1.0}
+PAIRS = ("seen_cells", "origin", "extent")  # of integers
+TABLES = ("position", "ball", "mean", "image", "gained")
+COUNTS, AMOUNTS = ("begin", "end", "width", "giver"), ("size", "radius", "largest", "reach")
+
+
+def example(name):
+    """An argument of the type that a driver has under this name."""
+    if name in COUNTS or name in AMOUNTS:
+        return 0 if name in COUNTS else 1.0
+    if name == "kind":
+        return np.zeros(1, np.int8)
+    dimensions = 5 if name == "kick" else 2 if name in TABLES + PAIRS else 1
+    return np.zeros((1,) * dimensions, np.int64 if name in INTEGERS + PAIRS else float)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("driver", POINTS, ids=lambda driver: driver.__name__)
 def test_points_near_each_other_are_packed(driver, tmp_path):
     """What a particle is to LANES points is computed at once: in the driver, where its rows know how many there are."""
-    text = emit.numba_text(driver, {"DIMENSIONS": 3, "LANES": 8}, {}, "float64", runtime.VERSION)
+    text = emit.numba_text(driver, {"DIMENSIONS": 3, "LANES": 8, "KICKS": 4}, {}, "float64", runtime.VERSION)
     (tmp_path / "kernel.py").write_text(text)
-    module = runpy.run_path(str(tmp_path / "kernel.py"))
-
-    def example(name):
-        if name in SCALARS:
-            return SCALARS[name]
-        if name in ("seen_cells", "origin", "extent", "grid_cells", *INTEGERS):
-            return np.zeros((1,) * (2 if name in ("seen_cells", "origin", "extent") else 1), np.int64)
-        return np.zeros((1,) * TABLES.get(name, 1))
-
-    kind = {"kind": np.zeros(1, np.int8), "kick": np.zeros((1,) * 5)}
-    arguments = [kind.get(name, example(name)) for name in inspect.signature(driver).parameters]
-    function = module[driver.__name__]
-    function(*arguments)
-    code = "\n".join(function.inspect_asm().values())
-    assert count(code, "mul", "pd", WIDE) >= 5
+    function = runpy.run_path(str(tmp_path / "kernel.py"))[driver.__name__]
+    function(*map(example, inspect.signature(driver).parameters))
+    assert count("\n".join(function.inspect_asm().values()), "mul", "pd", WIDE) >= 5

@@ -8,7 +8,7 @@ from distfsi.kernels.coupling import BOX, FLUID, LINE, flux_of_face, look_at_fac
 from distfsi.kernels.cut_cells import put_content, repeat_lane, share_at, state_at
 from distfsi.kernels.cut_geometry import opening
 from distfsi.kernels.fluid import face_fluxes, place, primitives_row, rises_row
-from distfsi.physics.moving_wall import normal_of, stage_content, wall_pressure
+from distfsi.physics.moving_wall import normal_of, stage_content, wall_impedance, wall_pressure
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, FLUXES, LANES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
 from distfsi.physics.tensors import dot
@@ -183,14 +183,15 @@ def content_row(S, Q, b, dt, n):
 
 @driver
 def advance_band(
-    begin, end, band, above, opened, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, shape,
-    rates, b, dt, weight,
+    begin, end, band, above, opened, flux, U_n, U, U_new, swept, start_volume, area, velocity, impulse, work, added,
+    shape, rates, b, dt, weight,
 ):  # fmt: skip
     """One stage of the band's cells, from the `flux` of find_fluxes(): U_new and swept = their contents. An item is a
     box of LANES cells.
 
     start_volume (n,): of the fluid before the step. area, velocity (n, D): of the wall; impulse (n, D) [N s/m3] and
-    work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume; weight: share of the stage times dt.
+    work (n,) [J/m3] grow by what the fluid gives to it in the cell, per volume, added (n,) [kg/m3] by how much less
+    impulse that were per velocity of the wall; weight: share of the stage times dt.
     """
     cells = shape[0] * shape[1] * shape[2]
     D, S, Q = workspace(FLUXES), workspace((2 * VARIABLES + 3 + FLUXES) * LANES), workspace((VARIABLES + 2) * LANES)
@@ -208,7 +209,9 @@ def advance_band(
             if size > 0.0:
                 W = primitives(now)
                 relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
-                p = wall_pressure(now, W, dot(relative, normal))
+                approach = dot(relative, normal)
+                p = wall_pressure(now, W, approach)
+                added[n] += weight * wall_impedance(now, W, approach) * size
                 for d in static_range(DIMENSIONS):
                     D[PHASES + d] += dt * p * surface[d]
                     impulse[n, d] += weight * p * surface[d]

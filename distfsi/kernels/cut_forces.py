@@ -1,7 +1,7 @@
 """Loops of the cut cells' forces: the velocity of the wall, and the work that the solid's gain of velocity costs.
 
-Cells give to particles with the weights by which they see them (kernels/coupling.py: push), mass times kernel; so
-momentum and work arrive as they leave.
+Cells give to particles with the weights by which they see them, mass times kernel; so momentum and work arrive as they
+leave. Where the wall is lighter than the fluid that goes along with it, both share (docs/theory.md: light bodies).
 """
 
 from math import sqrt
@@ -75,12 +75,24 @@ def find_middle(begin, end, start, position, middle, way):
 
 
 @driver
-def find_momentum(begin, end, mass, velocity, momentum):
-    """momentum[i] = mass and mass times velocity."""
+def find_momentum(begin, end, width, mass, velocity, momentum):
+    """momentum[i] (1 + width,) = mass and mass times velocity, or other values."""
     for i in range(begin, end):
         momentum[i, 0] = mass[i]
+        for k in range(width):
+            momentum[i, 1 + k] = mass[i] * velocity[i, k]
+
+
+@driver
+def find_gains(begin, end, carried, excess, shared, gains):
+    """gains[i] (2 D + 1,) = `excess`, `shared`, and this times the velocity at which impulses work."""
+    for i in range(begin, end):
+        work = 0.0
         for d in static_range(DIMENSIONS):
-            momentum[i, 1 + d] = mass[i] * velocity[i, d]
+            gains[i, d] = excess[i, d]
+            gains[i, DIMENSIONS + d] = shared[i, d]
+            work += shared[i, d] * (carried[i, d] + excess[i, d])
+        gains[i, 2 * DIMENSIONS] = work
 
 
 @driver
@@ -121,41 +133,56 @@ def cells_near(place, band, walled, first, last, radius, shape, lower, spacing, 
 
 @driver
 def see_particles(
-    begin, end, band, walled, mean, inertia, radius, momentum, position, start, order, lower, size, low, window,
+    begin, end, band, walled, width, mean, inertia, radius, amounts, position, start, order, lower, size, low, window,
     strides, shape, spacing, origin,
 ):  # fmt: skip
-    """mean (n, D) [m/s] of the particles' velocities, by mass times kernel, in the cells `walled` of the band.
+    """mean (n, width) of what the particles have, by mass times kernel, in the cells `walled` of the band.
 
-    momentum (particles, 1 + D): mass and mass times velocity, flat; inertia (n,) = sum of mass times kernel. An item is
+    amounts: mass and mass times `width` values per particle, flat; inertia (n,) = sum of mass times kernel. An item is
     a box of LANES cells.
     """
     place, around = workspace(DIMENSIONS * LANES), workspace(2 * DIMENSIONS)
-    weight, sums = workspace(LANES), workspace((1 + DIMENSIONS) * LANES)
+    weight, sums = workspace(LANES), workspace((2 + 2 * DIMENSIONS) * LANES)
     for box in range(begin, end):
         first, last = box * LANES, min((box + 1) * LANES, len(walled))
         while first < last:
             count = cells_near(place, band, walled, first, last, radius, shape, lower, spacing, origin)
             sum_around_all(
-                sums, weight, around, place, radius, momentum, 1 + DIMENSIONS, position, start, order, lower, size,
+                sums, weight, around, place, radius, amounts, 1 + width, 1 + width, position, start, order, lower, size,
                 low, window, strides,
             )  # fmt: skip
             for i in range(count):
                 n = walled[first + i]
                 inertia[n] = sums[i]
-                for d in range(DIMENSIONS):
-                    mean[n, d] = sums[(1 + d) * LANES + i] / sums[i] if sums[i] > 0.0 else 0.0
+                for v in range(width):
+                    mean[n, v] = sums[(1 + v) * LANES + i] / sums[i] if sums[i] > 0.0 else 0.0
             first += count
 
 
 @driver
-def spread_impulse(begin, end, band, volume, impulse, inertia, kick, shape):
-    """kick (blocks, D, Z, Y, X) = velocity that a particle gains from a cell of a `volume` per kernel value
-    [m^(d+1)/s]."""
+def spread_impulse(begin, end, band, volume, impulse, added, inertia, kick, shape):
+    """kick (blocks, D + 1, Z, Y, X) = velocity that a particle gains from a cell of a `volume`, and added mass over its
+    own, per kernel value [m^(d+1)/s, m^d]."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
-        at = band[n] + band[n] // cells * (DIMENSIONS - 1) * cells
+        at = band[n] + band[n] // cells * DIMENSIONS * cells
+        per_mass = volume / inertia[n] if inertia[n] > 0.0 else 0.0
         for d in static_range(DIMENSIONS):
-            store(kick, at + d * cells, impulse[n, d] * volume / inertia[n] if inertia[n] > 0.0 else 0.0)
+            store(kick, at + d * cells, impulse[n, d] * per_mass)
+        store(kick, at + DIMENSIONS * cells, added[n] * per_mass)
+
+
+@driver
+def push_together(begin, end, mass, fixed, before, velocity, gained, impulse, shared):
+    """impulse[p] (D,) [N s] = mass times the velocity of what a particle has `gained` (1 + D,); but of one that is free
+    and lighter than its added mass all forces of the step, those that have changed its velocity since `before` too,
+    accelerate the added mass alone, with shared[p] (D,) [m/s] per added mass; what that takes is not given to it."""
+    for p in range(begin, end):
+        along = 1.0 if fixed[p] else max(gained[p, DIMENSIONS], 1.0)
+        for d in static_range(DIMENSIONS):
+            taken = (1.0 - 1.0 / along) * (gained[p, d] + velocity[p, d] - before[p, d])
+            impulse[p, d] = mass[p] * (gained[p, d] - taken)
+            shared[p, d] = taken / along
 
 
 @driver
@@ -168,26 +195,41 @@ def find_pressures(begin, end, band, area, impulse, pressure):
 
 
 @driver
-def find_debts(begin, end, band, debt, impulse, excess):
-    """debt (blocks, 1, Z, Y, X) [J/m3] = what a cell's impulse (n, D) [N s/m3] does beyond its work at the velocity of
-    the wall: the impulse times the `excess` (n, D) [m/s] of the particles that it sees."""
+def find_debts(begin, end, band, added, impulse, gains, debt, shape):
+    """debt (blocks, D + 1, Z, Y, X) [N s/m3, J/m3] = what a cell gives to the particles beyond its `impulse` (n, D) and
+    the work of that at the velocity of the wall; impulse grows by it.
+
+    gains (n, 2 D + 1), of the particles that a cell sees: what the velocity at which an impulse works is beyond the
+    wall's, and velocity and work [m2/s2] that the fluid gains per `added` mass (n,) [kg/m3].
+    """
+    cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
-        J = tuple(impulse[n, d] for d in static_range(DIMENSIONS))
-        store(debt, band[n], dot(J, tuple(excess[n, d] for d in static_range(DIMENSIONS))))
+        at = band[n] + band[n] // cells * DIMENSIONS * cells
+        owed = -added[n] * gains[n, 2 * DIMENSIONS]
+        for d in static_range(DIMENSIONS):
+            given = -added[n] * gains[n, DIMENSIONS + d]
+            owed += impulse[n, d] * gains[n, d]
+            impulse[n, d] += given
+            store(debt, at + d * cells, given)
+        store(debt, at + DIMENSIONS * cells, owed)
 
 
 @driver
 def pay_debts(begin, end, band, joined, paid, debt, U, swept, master, offsets, steps, shape):
-    """Masters pay out of their energy for themselves and for those that joined them; paid (n,) [J/m3] of the cell."""
+    """Masters pay out of their momentum and energy for themselves and for those that joined them; paid (n,) [J/m3] of
+    the cell."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):
         at = band[n]
+        block = at // cells
         paid[n] = 0.0
         if way_to_master(master, at, cells, steps) == 0:
-            owed = load(debt, at)
-            for m in range(len(offsets)):
-                if joined[n, m] > 0:
-                    owed += load(debt, at + step_to(offsets, m, steps))
-            energy = at + (at // cells * (VARIABLES - 1) + PHASES + DIMENSIONS) * cells
-            paid[n] = owed
-            store(U, energy, load(U, energy) - owed / load(swept, share_at(at, cells)))
+            for d in range(DIMENSIONS + 1):
+                owed_at = at + (block * DIMENSIONS + d) * cells
+                owed = load(debt, owed_at)
+                for m in range(len(offsets)):
+                    if joined[n, m] > 0:
+                        owed += load(debt, owed_at + step_to(offsets, m, steps))
+                place = at + (block * (VARIABLES - 1) + PHASES + d) * cells
+                paid[n] = owed
+                store(U, place, load(U, place) - owed / load(swept, share_at(at, cells)))

@@ -151,11 +151,11 @@ def add_weighted(sums, weight, box, place, position, order, first, last, radius,
 
 @helper
 def sum_around_all(
-    sums, weight, box, place, radius, values, stride, position, start, order, lower, size, low, window, strides
+    sums, weight, box, place, radius, values, width, stride, position, start, order, lower, size, low, window, strides
 ):  # fmt: skip
-    """sums (k, LANES) = those of sum_particles() at the points `place` (D, LANES), of the first k of `stride` values
+    """sums (width, LANES) = those of sum_particles() at the points `place` (D, LANES), of the first of `stride` values
     per particle; weight (LANES,) and box (2 D,) are room."""
-    for v in range(len(sums)):
+    for v in range(width * LANES):
         sums[v] = 0.0
     bx, by, bz = bins_around_all(box, place, radius, lower, size, low, window)
     for k in range(bz[0], bz[1]):
@@ -163,5 +163,5 @@ def sum_around_all(
             row = k * strides[2] + j * strides[1]
             add_weighted(
                 sums, weight, box, place, position, order, start[row + bx[0]], start[row + bx[1]], radius, values,
-                stride, len(sums) // LANES, len(weight),
+                stride, width, len(weight),
             )  # fmt: skip

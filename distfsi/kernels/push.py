@@ -9,7 +9,7 @@ from distfsi.kernels.coupling import cell_at, home_of, three
 from distfsi.kernels.gather import are_near, least_of, most_of, put_place
 from distfsi.physics.immersed import immersed_weight
 from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import DIMENSIONS, LANES
+from distfsi.physics.symbols import DIMENSIONS, KICKS, LANES
 from distfsi.physics.tensors import dot
 
 
@@ -40,15 +40,15 @@ def cells_around(place, radius, b, lower, spacing, origin, extent, seen_cells):
 
 @row
 def push_row(total, place, part, center, outside, kick, at, cells, radius, n):
-    """total (D, n) [m/s] grows by the kernels around the points `place` (D, n) at the `center` (D,) of a cell, times
-    its `kick`; along axes along which it is `outside` of the grid it counts by their `part` (D, n)."""
+    """total (KICKS, n) grows by the kernels around the points `place` (D, n) at the `center` (D,) of a cell, times its
+    `kick` (KICKS,); along axes along which it is `outside` of the grid it counts by their `part` (D, n)."""
     for i in range(n):
         dx = tuple(load(center, d) - load(place, d * LANES + i) for d in static_range(DIMENSIONS))
         weight = immersed_weight(min(dot(dx, dx), radius * radius), radius)
         for d in static_range(DIMENSIONS):
             weight = weight * (load(part, d * LANES + i) if load(outside, d) > 0.0 else 1.0)
-        for d in static_range(DIMENSIONS):
-            store(total, d * LANES + i, load(total, d * LANES + i) + weight * load(kick, at + d * cells))
+        for v in static_range(KICKS):
+            store(total, v * LANES + i, load(total, v * LANES + i) + weight * load(kick, at + v * cells))
 
 
 @helper
@@ -78,19 +78,19 @@ def find_homes(begin, end, start, home, lower, spacing, grid_cells, block_cells,
 
 
 @driver
-def push(
-    begin, end, chosen, position, home, mass, image, impulse, radius, kind, giver, kick, shape, lower, spacing, origin,
-    extent, seen_cells, grid_cells,
+def gather_kicks(
+    begin, end, chosen, position, home, image, gained, radius, kind, giver, kick, shape, lower, spacing, origin, extent,
+    seen_cells, grid_cells,
 ):  # fmt: skip
-    """impulse[p] (D,) [N s] = mass * sum of kernel * kick over the cells around the `position` of a particle, none but
-    those of the kind `giver` having any, in the memory of the block `home`. An item is a box of LANES of the particles
-    `chosen`.
+    """gained[p] (KICKS,) = sum of kernel * kick (blocks, KICKS, Z, Y, X) over the cells around the `position` of a
+    particle, none but those of the kind `giver` having any, in the memory of the block `home`. An item is a box of
+    LANES of the particles `chosen`.
 
     seen_cells (3, 2): first and past-the-end cell of the grid with its images at symmetry planes; image (n, D): how
     much these count for a particle, along each axis.
     """
     place, part = workspace(DIMENSIONS * LANES), workspace(DIMENSIONS * LANES)
-    total = workspace(DIMENSIONS * LANES)
+    total = workspace(KICKS * LANES)
     center, outside = workspace(3), workspace(3)
     cells = shape[0] * shape[1] * shape[2]
     for box in range(begin, end):
@@ -107,19 +107,27 @@ def push(
                         at = cell_at(b, i - origin[b, 0], j - origin[b, 1], k - origin[b, 2], shape)
                         if kind[at] != giver:
                             continue
-                        first_kick = at + b * (DIMENSIONS - 1) * cells
-                        given = tuple(load(kick, first_kick + d * cells) for d in static_range(DIMENSIONS))
-                        if dot(given, given) > 0.0:
+                        first_kick, largest = at + b * (KICKS - 1) * cells, 0.0
+                        for v in range(KICKS):
+                            largest = max(largest, abs(load(kick, first_kick + v * cells)))
+                        if largest > 0.0:
                             index = (i, j, k)
                             for d in static_range(3):
                                 center[d] = lower[d] + (index[d] + 0.5) * spacing[d]
                                 outside[d] = 1.0 if index[d] < 0 or index[d] >= grid_cells[d] else 0.0
                             push_row(
                                 total, place, part, center, outside, kick, first_kick, cells, radius,
-                                len(total) // DIMENSIONS,
+                                len(total) // KICKS,
                             )  # fmt: skip
             for i in range(count):
-                p = chosen[first + i]
-                for d in static_range(DIMENSIONS):
-                    impulse[p, d] = mass[p] * total[d * LANES + i]
+                for v in range(KICKS):
+                    gained[chosen[first + i], v] = total[v * LANES + i]
             first += count
+
+
+@driver
+def push(begin, end, mass, gained, impulse):
+    """impulse[p] (D,) [N s] = mass times the velocity that a particle has gained."""
+    for p in range(begin, end):
+        for d in static_range(DIMENSIONS):
+            impulse[p, d] = mass[p] * gained[p, d]

@@ -366,7 +366,7 @@ def find_distances(
         while first < last:
             count = corners_near(place, chosen, first, last, radius, shape, lower, spacing, origin, cells)
             sum_around_all(
-                filled, weight, around, place, radius, volume, columns, position, start, order, lower, size, low,
+                filled, weight, around, place, radius, volume, 1, columns, position, start, order, lower, size, low,
                 window, strides,
             )  # fmt: skip
             for i in range(count):

@@ -32,6 +32,7 @@ PARTICLE_DRIVERS = (
     kernels.list_cells,
     kernels.find_wall_velocity,
     push.find_homes,
+    push.gather_kicks,
     push.push,
     cut_forces.clear,
 )
@@ -63,7 +64,9 @@ class Coupling:
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
-        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": 1})
+        self.kernels = team.build(
+            PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": 1, "KICKS": grid.dimensions}
+        )
         self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
 
@@ -193,14 +196,15 @@ class Coupling:
         wall = (self._covered, self._passed, self._velocity, self._inertia)
         self._run(self.fluid_kernels.spread, *wall, self._kick, self._shape)
         self._exchange(self._kick, np.arange(D), 0.0)
-        impulse, home, image = team.empty((own, D)), team.empty(own, np.int64), team.array(np.ones((own, D)))
-        start, grid = self.solid.start, (self._lower, self._widths)
+        impulse, gained, image = team.empty((own, D)), team.empty((own, D)), team.array(np.ones((own, D)))
+        start, grid, home = self.solid.start, (self._lower, self._widths), team.empty(own, np.int64)
         team.run(self.kernels.find_homes, own, start, home, *grid, *self._homes, self.blocks.first)
         team.run(
-            self.kernels.push, own, team.array(np.arange(own)), start, home, *self.solid.columns.read("mass"), image,
-            impulse, self.reach, self._kinds, kernels.COVERED, self._kick, self._shape, *grid, self._origin,
-            self._extent, self._seen_cells, self._homes[0],
+            self.kernels.gather_kicks, own, team.array(np.arange(own)), start, home, image, gained, self.reach,
+            self._kinds, kernels.COVERED, self._kick, self._shape, *grid, self._origin, self._extent, self._seen_cells,
+            self._homes[0],
         )  # fmt: skip
+        team.run(self.kernels.push, own, *self.solid.columns.read("mass"), gained, impulse)
         self._run(self.kernels.clear, self._covered, D, self._kick.reshape(-1), self._shape)
         self._ledger["wall"] -= self._per_block(kernels.COVERED_CELLS, self._passed)
         return impulse

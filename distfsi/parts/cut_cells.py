@@ -46,8 +46,10 @@ PARTICLE_DRIVERS = (
     cut_forces.mark_stretched,
     cut_forces.find_middle,
     cut_forces.find_momentum,
+    cut_forces.find_gains,
     cut_forces.mark_walled,
     cut_forces.see_particles,
+    cut_forces.push_together,
     cut_forces.find_pressures,
     cut_forces.find_debts,
     cut_forces.clear,
@@ -55,7 +57,7 @@ PARTICLE_DRIVERS = (
     images.weigh_images,
     images.fade_images,
     push.find_homes,
-    push.push,
+    push.gather_kicks,
 )
 FLUID_DRIVERS = (
     kernels.take_contents,
@@ -102,7 +104,8 @@ class CutCells:
         self._stairs = scene.coupling.scheme == "stairs"
         coarsest = max(body.spacing for body in scene.solid.bodies)
         self.wall = WallGeometry(blocks, team, coarsest, real, scene.time.cfl, self._stairs)
-        self.kernels = team.build(PARTICLE_DRIVERS, {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes})
+        constants = {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes, "KICKS": 1 + grid.dimensions}
+        self.kernels = team.build(PARTICLE_DRIVERS, constants)
         self.fluid_kernels = team.build(
             FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
         )
@@ -127,12 +130,12 @@ class CutCells:
         self._fields = 3 if model.phases == 2 else 1
         self.swept = Pair(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
         fluid.volumes = self.swept
-        self._state_parity, self._swept_parity, self._vector_parity, self._scalar_parity = (
+        self._state_parity, self._swept_parity, self._given_parity = (
             team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0)))
-            for axes in (model.mirror, np.full(self._fields, -1), np.arange(grid.dimensions), np.array([-1]))
+            for axes in (model.mirror, np.full(self._fields, -1), np.append(np.arange(grid.dimensions), -1))
         )
         self._master = team.array(blocks.allocate(grid.dimensions, np.int8))
-        self._kick, self._debt = (team.array(blocks.allocate(k)) for k in (grid.dimensions, 1))
+        self._kick, self._debt = (team.array(blocks.allocate(1 + grid.dimensions)) for _ in range(2))
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         self._find_sides()
         self._keep_lists([team.empty(0, np.int64)] * 3, np.zeros((blocks.local_count, 3), dtype=np.int64))
@@ -203,7 +206,7 @@ class CutCells:
         n = self._band.shape[0]
         self._area, self._start_volume = team.empty((n, D)), team.empty(n)
         self._velocity, self._inertia = team.zeros((n, D)), team.zeros(n)
-        self._impulse, self._work = team.zeros((n, D)), team.zeros(n)
+        self._impulse, self._work, self._added = team.zeros((n, D)), team.zeros(n), team.zeros(n)
         self._opened, self._seen = team.empty((n, 2 * D)), team.empty(2 * D * n, np.int8)
         self._run(self.fluid_kernels.find_walls, self._area, self._opened, *self._walls, self.wall.spacing)
         self._run(self.fluid_kernels.find_faces, self._above, self._opened, self._seen, *self._walls)
@@ -237,7 +240,7 @@ class CutCells:
         self._run_boxes(
             self.fluid_kernels.advance_band, self._above, self._opened, self._flux, self._start, self._input,
             self._output, self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work,
-            self.wall.shape, rates, stage.b, dt, weight,
+            self._added, self.wall.shape, rates, stage.b, dt, weight,
         )  # fmt: skip
         self.team.run(
             self.fluid_kernels.book_sides, self._near_sides.shape[0], self._near_sides, *self._sides,
@@ -266,21 +269,17 @@ class CutCells:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
         D, wall, own = self._dimensions, self.wall, self.solid.count
         self._run(
-            self.fluid_kernels.spread_impulse, self._cell_volume, self._impulse, self._inertia, self._kick, wall.shape
-        )
-        self._near_ghosts.exchange((self._kick, self._vector_parity))
-        given, home = self.team.empty((own, D)), self.team.empty(own, np.int64)
-        chosen = wall.coarse_order(self._own_middle, *self.solid.columns.read("id"))
-        grid = (self._corners[0], wall.spacing)
-        homes = (wall.cells, *self._homes, self.blocks.first)
-        self.team.run(self.kernels.find_homes, own, self.solid.start, home, *grid, *homes)
-        self.team.run(
-            self.kernels.push, -(-own // wall.lanes), chosen, self._own_middle, home, self._own_mass, self._image,
-            given, wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, *grid, wall.origin, wall.extent,
-            self._seen_cells, wall.cells,
+            self.fluid_kernels.spread_impulse, self._cell_volume, self._impulse, self._added, self._inertia, self._kick,
+            wall.shape,
         )  # fmt: skip
+        self._near_ghosts.exchange((self._kick, self._given_parity))
+        gained = self._gather_kicks()
         for cells in (self._band, *self._near_ghosts.cells):
-            self.team.run(self.kernels.clear, cells.shape[0], cells, D, self._kick.reshape(-1), wall.shape)
+            self.team.run(self.kernels.clear, cells.shape[0], cells, 1 + D, self._kick.reshape(-1), wall.shape)
+        given, self._shared = (self.team.empty((own, D)) for _ in range(2))
+        fixed, velocity = self.solid.columns.read("fixed", "velocity")
+        known = (self._own_mass, fixed, self.solid.before, velocity, gained)
+        self.team.run(self.kernels.push_together, own, *known, given, self._shared)
         paid = np.zeros((self.blocks.local_count, D + 1))
         self._dragged = self.drag(self._lone, given) if self._lone.shape[0] else paid
         return given
@@ -301,12 +300,15 @@ class CutCells:
         """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
         wall: the fluid pays for it."""
         D, P = self._dimensions, self.model.phases
-        (velocity,) = self._plan.exchange([(excess, tuple((a,) for a in range(D)))])
-        mean, paid = self.team.zeros(self._velocity.shape), self.team.empty(self._band.shape)
-        self._see(velocity, mean)
-        debt = self._debt.reshape(-1)
-        self._run(self.kernels.find_debts, debt, self._impulse, mean)
-        self._near_ghosts.exchange((self._debt, self._scalar_parity))
+        vector = tuple((a,) for a in range(D))
+        own, paid, debt = self.solid.count, self.team.empty(self._band.shape), self._debt.reshape(-1)
+        gains = self.team.empty((own, 2 * D + 1))
+        self.team.run(self.kernels.find_gains, own, self.solid.carried, excess, self._shared, gains)
+        (gains,) = self._plan.exchange([(gains, (*vector, *vector, ()))])
+        seen = self.team.zeros((self._band.shape[0], 2 * D + 1))
+        self._see(gains, seen)
+        self._run(self.kernels.find_debts, self._added, self._impulse, seen, debt, self.wall.shape)
+        self._near_ghosts.exchange((self._debt, self._given_parity))
         self._run(
             self.fluid_kernels.pay_debts, self._joined, paid, debt, self.fluid.there, self._swept, *self._company
         )  # fmt: skip
@@ -443,17 +445,32 @@ class CutCells:
         self._band_cells = counts[:, 0]
         self._groups = Groups(self.team, self.kernels, self._band_cells)
 
-    def _see(self, velocity: Any, mean: Any) -> None:
-        """mean (band, D) of particles' velocities around the cells with a wall, where the particles were in the middle
+    def _see(self, values: Any, mean: Any) -> None:
+        """mean (band, k) of what particles have (count, k) around the cells with a wall, where they were in the middle
         of the step: only there is the way that a turning wall went along itself."""
-        count, wall = velocity.shape[0], self.wall
-        momentum = self.team.empty((count, 1 + self._dimensions))
-        self.team.run(self.kernels.find_momentum, count, self._mass, velocity, momentum)
+        (count, width), wall = values.shape, self.wall
+        amounts = self.team.empty((count, 1 + width))
+        self.team.run(self.kernels.find_momentum, count, width, self._mass, values, amounts)
         self.team.run(
-            self.kernels.see_particles, -(-self._walled.shape[0] // wall.lanes), self._band, self._walled, mean,
-            self._inertia, wall.seen, momentum.reshape(-1), self._middle, *self._middle_bins, wall.shape, wall.spacing,
+            self.kernels.see_particles, -(-self._walled.shape[0] // wall.lanes), self._band, self._walled, width, mean,
+            self._inertia, wall.seen, amounts.reshape(-1), self._middle, *self._middle_bins, wall.shape, wall.spacing,
             wall.origin,
         )  # fmt: skip
+
+    def _gather_kicks(self) -> Any:
+        """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
+        its own."""
+        own, wall, team = self.solid.count, self.wall, self.team
+        gained, home = team.empty((own, 1 + self._dimensions)), team.empty(own, np.int64)
+        chosen = wall.coarse_order(self._own_middle, *self.solid.columns.read("id"))
+        grid, homes = (self._corners[0], wall.spacing), (wall.cells, *self._homes, self.blocks.first)
+        team.run(self.kernels.find_homes, own, self.solid.start, home, *grid, *homes)
+        team.run(
+            self.kernels.gather_kicks, -(-own // wall.lanes), chosen, self._own_middle, home, self._image, gained,
+            wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, *grid, wall.origin, wall.extent,
+            self._seen_cells, wall.cells,
+        )  # fmt: skip
+        return gained
 
     def _mix(self, U: Any, fraction: Any) -> None:
         """Contents of the band become states of what belongs together; covered cells rest."""

@@ -59,6 +59,7 @@ class Solid:
              materials remember (parts/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s],
              damage (n,) … Velocities belong to half a step before the positions.
     start    (own, D) [m] positions when the step began, on the device
+    before   (own, D) [m/s] velocities then, on the device
     carried  (own, D) [m/s] mean velocity since then, on the device
     sub_steps  that have been made since then
     work     (local blocks,) work [J] of the last step's external impulse
@@ -148,7 +149,9 @@ class Solid:
         device.run(self.kernels.collect_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
         (here,) = c.read("position")
         if not goes_on:
-            self.start, self.carried, self.sub_steps = here, device.zeros((own, self.dimensions)), 0
+            self.start, self.sub_steps = here, 0
+            self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
+            self._run(self.kernels.average, 1, *c.read("velocity"), self.before)
         reach = max(reach, support)
         plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.asked(c), image_reach=reach)
         given = [(here, "position"), (state, parity + self._vector), *self.form.told(c)]

@@ -50,6 +50,12 @@ def wall_pressure(U, W, approach):
     return p + (shock if approach >= 0.0 else fan)
 
 
+def wall_impedance(U, W, approach):
+    """By how much wall_pressure() falls [Pa s/m] when the wall goes faster: not more than this, and that in sound."""
+    rho = sum(U[v] for v in static_range(PHASES))
+    return rho * (sound_speed(W) + (growth(W) + 1.0) * max(approach, 0.0))
+
+
 def phase_energies(W):
     """alpha_k rho_k e_k [J/m3] of both phases."""
     a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
