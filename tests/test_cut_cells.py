@@ -89,8 +89,8 @@ def test_an_image_counts_where_its_body_reaches_the_end_of_the_domain(dimensions
     place, opened = case.solid.columns["position"].copy(), []
     for gap in gaps:
         case.solid.columns["position"] = place + gap * (np.arange(D) == D - 1)
-        case.coupling._look(*case.solid.columns.read("position"))
-        case.coupling._cut(*case.solid.columns.read("position", "velocity"))
+        case.coupling._particles.look(*case.solid.columns.read("position"))
+        case.coupling._particles.cut(*case.solid.columns.read("position", "velocity"))
         beneath = case.grid_of(case.coupling.wall.fractions[1].here())[0]
         opened.append(beneath[(0,) * (3 - D) + (0,) + (n // 2,) * (D - 1)])
     near = gaps < 0.31

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -11,27 +9,27 @@ import numpy as np
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as immersed_kernels
 from distfsi.kernels import cut_cells as kernels
-from distfsi.kernels import cut_fluxes, cut_forces, images, push
+from distfsi.kernels import cut_fluxes
 from distfsi.kernels import rows as row_kernels
-from distfsi.kernels.band import BAND, FAR
+from distfsi.kernels.band import FAR
 from distfsi.kernels.particles import EXCHANGE
 from distfsi.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
-from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
+from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.exchange import GhostExchange
-from distfsi.mesh.particles import GhostPlan, ParticleExchange
+from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
-from distfsi.parts import dust
+from distfsi.parts import dust, sides, wall_forces, wall_particles
 from distfsi.parts.dust import Dust
 from distfsi.parts.fluid import Fluid, Stage
 from distfsi.parts.initial import InitialState
+from distfsi.parts.sides import Sides
 from distfsi.parts.solid import Solid
-from distfsi.parts.thickness import Thickness
+from distfsi.parts.wall_forces import WallForces
 from distfsi.parts.wall_geometry import WallGeometry
-from distfsi.parts.wall_points import WallPoints
+from distfsi.parts.wall_particles import WallParticles
 from distfsi.scene.description import Scene
 
-MIRRORS = ("symmetry", "wall", "outflow", "inflow")
 LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
 PARTICLE_DRIVERS = (
@@ -40,24 +38,9 @@ PARTICLE_DRIVERS = (
     pack_cells,
     unpack_cells,
     *row_kernels.REDUCTIONS,
-    cut_forces.keep_mass,
-    cut_forces.keep_inside,
-    cut_forces.find_volumes,
-    cut_forces.mark_stretched,
-    cut_forces.find_middle,
-    cut_forces.find_momentum,
-    cut_forces.find_gains,
-    cut_forces.mark_walled,
-    cut_forces.see_particles,
-    cut_forces.push_together,
-    cut_forces.find_pressures,
-    cut_forces.find_debts,
-    cut_forces.clear,
+    *wall_particles.DRIVERS,
+    *wall_forces.PARTICLE_DRIVERS,
     *dust.PARTICLE_DRIVERS,
-    images.weigh_images,
-    images.fade_images,
-    push.find_homes,
-    push.gather_kicks,
 )
 FLUID_DRIVERS = (
     kernels.take_contents,
@@ -74,10 +57,9 @@ FLUID_DRIVERS = (
     cut_fluxes.find_fluxes,
     cut_fluxes.advance_band,
     kernels.exchange_volumes,
-    cut_fluxes.book_sides,
+    *sides.DRIVERS,
     kernels.keep_volumes,
-    cut_forces.spread_impulse,
-    cut_forces.pay_debts,
+    *wall_forces.FLUID_DRIVERS,
     *dust.FLUID_DRIVERS,
 )
 
@@ -111,16 +93,17 @@ class CutCells:
         )
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
         self._near_ghosts = ChosenGhosts(self.exchange, team, self.kernels)
-        self._particles = ParticleExchange(blocks, team, self.kernels)
-        self._points = WallPoints(self._particles.rows, self.kernels, max(grid.spacing[: grid.dimensions]))
+        particles = ParticleExchange(blocks, team, self.kernels)
+        self._rows, built = particles.rows, (self.kernels, self.fluid_kernels)
+        self._particles = WallParticles(solid, particles, self.kernels, self.wall)
+        self._forces = WallForces(self.wall, self._particles, self._rows, built, self._near_ghosts)
         self._spacing = np.array(grid.spacing)
         self.sub_steps = scene.coupling.sub_steps
         self.stray = FARTHEST_MOVE * float(self._spacing[: self._dimensions].min())
-        self._corners = [team.array(np.array(corner)) for corner in (grid.lower, grid.upper)]
-        self._homes = [team.array(np.array(values)) for values in (blocks.block_cells, blocks.curve_index)]
-        place = (self.wall.shape, self._corners[0], self.wall.spacing, self.wall.origin, self.wall.cells, *self._homes)
-        built = (self.kernels, self.fluid_kernels)
-        self.dust = Dust(solid.columns, self._particles.rows, built, self.wall, *place, blocks.first)
+        homes = (blocks.block_cells, blocks.curve_index)
+        lower, *homes = (team.array(np.array(values)) for values in (grid.lower, *homes))
+        place = (self.wall.shape, lower, self.wall.spacing, self.wall.origin, self.wall.cells, *homes, blocks.first)
+        self.dust = Dust(solid.columns, self._rows, built, self.wall, *place)
         self._cell_volume = float(self._spacing.prod())
         self._initial = InitialState(scene.fluid, model)
         self._rest = self._state_at_rest(scene)
@@ -130,21 +113,19 @@ class CutCells:
         self._fields = 3 if model.phases == 2 else 1
         self.swept = Pair(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
         fluid.volumes = self.swept
-        self._state_parity, self._swept_parity, self._given_parity = (
+        self._state_parity, self._swept_parity = (
             team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0)))
-            for axes in (model.mirror, np.full(self._fields, -1), np.append(np.arange(grid.dimensions), -1))
+            for axes in (model.mirror, np.full(self._fields, -1))
         )
         self._master = team.array(blocks.allocate(grid.dimensions, np.int8))
-        self._kick, self._debt = (team.array(blocks.allocate(1 + grid.dimensions)) for _ in range(2))
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
-        self._find_sides()
+        self._sides = Sides(fluid, model.conserved, self.wall, self.fluid_kernels)
         self._keep_lists([team.empty(0, np.int64)] * 3, np.zeros((blocks.local_count, 3), dtype=np.int64))
-        self._thickness = Thickness(solid.columns, self.wall, max(grid.spacing[: grid.dimensions]))
         (position,) = solid.columns.read("position")
-        self._look(position)
-        self.dust.find(solid.columns, self._middle, self._middle_bins)
+        self._particles.look(position)
+        self.dust.find(solid.columns, self._particles.middle, self._particles.bins)
         for _ in range(2):
-            self._cut(position, team.zeros(position.shape))
+            self._particles.cut(position, team.zeros(position.shape))
         self._fill_at_start()
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
@@ -168,57 +149,32 @@ class CutCells:
             changed.changed()
         self._exchange_swept()
 
-    def _find_sides(self) -> None:
-        """This rank's cells at the domain's sides, and which sides; and the range of cells that particles see: the grid
-        and its images at all sides."""
-        grid, blocks = self.blocks.grid, self.blocks
-        cells = np.arange(blocks.local_count * np.prod(blocks.shape)).reshape(-1, *blocks.shape)
-        places, sides = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-        for block, (origin, extent) in enumerate(zip(blocks.origin, blocks.extent, strict=True)):
-            active = self.fluid.active(cells, block)
-            for axis, side in product(range(grid.dimensions), (0, 1)):
-                if origin[axis] + side * extent[axis] == side * grid.cells[axis]:
-                    places.append(active.take(-side, axis=2 - axis).ravel())
-                    sides.append(np.full(len(places[-1]), 2 * axis + side))
-        self._side_cells, self._side = np.concatenate(places), np.concatenate(sides)
-        self._side_blocks = self._side_cells // prod(blocks.shape)
-        self._sides = [self.team.array(a) for a in (self._side_cells, self._side)]
-        self._through_sides = Pair(self.team, np.zeros((len(self._side), self.model.conserved)))
-        images = GHOSTS * (np.arange(3) < grid.dimensions)
-        self._seen_cells = self.team.array(np.column_stack([-images, grid.cells + images]))
-
     # ---- one step ---------------------------------------------------------------------------------------------------
 
     def time_step(self) -> float:
         """Longest step [s] in which no particle of this rank goes farther than LARGEST_MOVE."""
-        lowest, highest = self._particles.rows.bounds(*self.solid.columns.read("velocity"))
+        lowest, highest = self._rows.bounds(*self.solid.columns.read("velocity"))
         speed = max(-lowest.min(), highest.max())
         return LARGEST_MOVE * float(self._spacing[: self._dimensions].min()) / max(speed, 1e-300)
 
     def follow(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         team, D = self.team, self._dimensions
-        self._thickness.way += self._look(self.solid.start)
-        self.dust.find(self.solid.columns, self._middle, self._middle_bins)
+        particles = self._particles
+        particles.thickness.way += particles.look(self.solid.start)
+        self.dust.find(self.solid.columns, particles.middle, particles.bins)
         self._lone = self.dust.rows(self.solid.columns)
-        self._cut(self.solid.start, self.solid.carried)
+        particles.cut(self.solid.start, self.solid.carried)
         self._find_company()
         n = self._band.shape[0]
         self._area, self._start_volume = team.empty((n, D)), team.empty(n)
-        self._velocity, self._inertia = team.zeros((n, D)), team.zeros(n)
-        self._impulse, self._work, self._added = team.zeros((n, D)), team.zeros(n), team.zeros(n)
         self._opened, self._seen = team.empty((n, 2 * D)), team.empty(2 * D * n, np.int8)
         self._run(self.fluid_kernels.find_walls, self._area, self._opened, *self._walls, self.wall.spacing)
         self._run(self.fluid_kernels.find_faces, self._above, self._opened, self._seen, *self._walls)
-        self._faces = self._particles.rows.marked(self._seen)[1]
+        self._faces = self._rows.marked(self._seen)[1]
         self._flux = team.empty((n, 2 * D * self.model.constants["FLUXES"]))
-        mark = team.empty(n, np.int8)
-        self._run(self.kernels.mark_walled, self._area, mark)
-        walled = self._particles.rows.marked(mark)[1]
-        cells = self._particles.rows.taken(self._band, walled)
-        self._walled = self.wall.near_order(walled, cells, self.blocks.shape)
-        self._see(self._particle_velocity, self._velocity)
-        self._near_sides = self.wall.band_rows(self._sides[0])
+        self._forces.begin(self._band, self._groups, self._area)
+        self._sides.choose()
 
     def before_stage(self, stage: Stage) -> None:
         """Collective. Mix what belongs together in the stage's input, and leave it as states."""
@@ -234,18 +190,15 @@ class CutCells:
         rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
         self._dt = dt
         rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
-        boxes = -(-self._faces.shape[0] // self.team.lanes)
+        boxes, forces = -(-self._faces.shape[0] // self.team.lanes), self._forces
         given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
         self.team.run(self.fluid_kernels.find_fluxes, boxes, *given)
         self._run_boxes(
             self.fluid_kernels.advance_band, self._above, self._opened, self._flux, self._start, self._input,
-            self._output, self._swept, self._start_volume, self._area, self._velocity, self._impulse, self._work,
-            self._added, self.wall.shape, rates, stage.b, dt, weight,
+            self._output, self._swept, self._start_volume, self._area, forces.velocity, forces.impulse, forces.work,
+            forces.added, self.wall.shape, rates, stage.b, dt, weight,
         )  # fmt: skip
-        self.team.run(
-            self.fluid_kernels.book_sides, self._near_sides.shape[0], self._near_sides, *self._sides,
-            self._through_sides.there, self._input, *self._walls, rates, weights,
-        )  # fmt: skip
+        self._sides.book(self._input, self._walls, rates, weights)
         if stage is self.fluid.stages[-1]:
             self._settle()
 
@@ -267,20 +220,8 @@ class CutCells:
 
     def impulse(self) -> Any:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
-        D, wall, own = self._dimensions, self.wall, self.solid.count
-        self._run(
-            self.fluid_kernels.spread_impulse, self._cell_volume, self._impulse, self._added, self._inertia, self._kick,
-            wall.shape,
-        )  # fmt: skip
-        self._near_ghosts.exchange((self._kick, self._given_parity))
-        gained = self._gather_kicks()
-        for cells in (self._band, *self._near_ghosts.cells):
-            self.team.run(self.kernels.clear, cells.shape[0], cells, 1 + D, self._kick.reshape(-1), wall.shape)
-        given, self._shared = (self.team.empty((own, D)) for _ in range(2))
-        fixed, velocity = self.solid.columns.read("fixed", "velocity")
-        known = (self._own_mass, fixed, self.solid.before, velocity, gained)
-        self.team.run(self.kernels.push_together, own, *known, given, self._shared)
-        paid = np.zeros((self.blocks.local_count, D + 1))
+        given = self._forces.impulse_on(self.solid)
+        paid = np.zeros((self.blocks.local_count, self._dimensions + 1))
         self._dragged = self.drag(self._lone, given) if self._lone.shape[0] else paid
         return given
 
@@ -300,27 +241,14 @@ class CutCells:
         """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
         wall: the fluid pays for it."""
         D, P = self._dimensions, self.model.phases
-        vector = tuple((a,) for a in range(D))
-        own, paid, debt = self.solid.count, self.team.empty(self._band.shape), self._debt.reshape(-1)
-        gains = self.team.empty((own, 2 * D + 1))
-        self.team.run(self.kernels.find_gains, own, self.solid.carried, excess, self._shared, gains)
-        (gains,) = self._plan.exchange([(gains, (*vector, *vector, ()))])
-        seen = self.team.zeros((self._band.shape[0], 2 * D + 1))
-        self._see(gains, seen)
-        self._run(self.kernels.find_debts, self._added, self._impulse, seen, debt, self.wall.shape)
-        self._near_ghosts.exchange((self._debt, self._given_parity))
-        self._run(
-            self.fluid_kernels.pay_debts, self._joined, paid, debt, self.fluid.there, self._swept, *self._company
-        )  # fmt: skip
-        impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self._impulse, self._work, paid))
+        fluid = (self._joined, self.fluid.there, self._swept, *self._company)
+        impulse, work = self._forces.pay(self.solid, excess, *fluid)
         self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse - self._dragged[:, :-1]
-        self._wall_sums[:, -1] += self.solid.work - work[:, 0] - extra[:, 0] - self._dragged[:, -1]
+        self._wall_sums[:, -1] += self.solid.work - work - self._dragged[:, -1]
 
     def pressure(self, dt: float) -> float:
         """Collective. The highest mean pressure [Pa] on a cell's wall in the last step, of `dt` [s]."""
-        pressure = self.team.empty(self._band.shape[0])
-        self._run(self.kernels.find_pressures, self._area, self._impulse, pressure)
-        highest = self._particles.rows.largest(pressure, 0.0) / dt
+        highest = self._rows.largest(self._forces.pressures(), 0.0) / dt
         return float(self.blocks.communicator.maximum(np.array([highest]))[0])
 
     def sealed(self) -> np.ndarray:
@@ -344,59 +272,6 @@ class CutCells:
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
-    def _look(self, start: Any) -> float:
-        """Collective. The particles around this rank's, which have moved from `start`; how far one did at most [m]."""
-        c, team, own = self.solid.columns, self.team, self.solid.count
-        self._own_middle, way = team.empty(start.shape), team.empty(own)
-        team.run(self.kernels.find_middle, own, start, *c.read("position"), self._own_middle, way)
-        self._stretched = self._points.stretched(c)
-        most = np.array([self._particles.rows.largest(way, 0.0), float(self._stretched.shape[0])])
-        farthest, split = self.blocks.communicator.maximum(most)
-        self._split = split > 0.0
-        self._plan = self._ghosts(start, c["id"])
-        (self._middle,) = self._plan.exchange([(self._own_middle, "position")])
-        self._middle_bins = self.wall.sort(self._middle, self._plan.key.there)
-        return farthest
-
-    def _cut(self, start: Any, velocity: Any) -> None:
-        """The cells cut by the particles that _look() has found, which have moved from `start` with `velocity`."""
-        c, team, wall, own = self.solid.columns, self.team, self.wall, self.solid.count
-        self._own_mass, known = team.empty(own), c.read("dust", "mass", "density")
-        team.run(self.kernels.keep_mass, own, start, *known, *self._corners, self._own_mass)
-        vector = tuple((a,) for a in range(self._dimensions))
-        self._particle_velocity, self._mass = self._plan.exchange([(velocity, vector), (self._own_mass, ((),))])
-        (point,), size, plan = c.read("position"), self._points.volumes(c), self._plan
-        if self._split:
-            point, size, number = self._points.of(c, self._stretched)
-            plan = self._ghosts(point, number)
-        inside = team.empty((point.shape[0], 2))
-        team.run(self.kernels.keep_inside, point.shape[0], point, size, *self._corners, inside)
-        position, volume = plan.exchange([(point, "position"), (inside, ((), ()))])
-        bins = wall.sort(position, plan.key.there)
-        points = (plan.key.there, volume, position, *bins)
-        self._image, image = self._weigh_images(plan, point, size, points)
-        team.run(self.kernels.fade_images, plan.count, plan.key.there, image, 2, volume.reshape(-1))
-        if self._split:
-            self._image, image = self._weigh_images(self._plan, *c.read("position"), self._points.volumes(c), points)
-        team.run(self.kernels.fade_images, self._plan.count, self._plan.key.there, image, 1, self._mass)
-        ball = self._thickness.balls(c, plan, position, volume, bins, self._split)
-        wall.cut(position, volume, ball, plan.key.there, bins)
-
-    def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
-        """Collective. Who needs copies of which particles or points."""
-        return self._particles.ghosts(position, id, self.wall.reach, image_reach=self.wall.images, mirrors=MIRRORS)
-
-    def _weigh_images(self, plan: GhostPlan, place: Any, size: Any, points: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Collective. How much images along each axis count of the particles at a `place` (own, D) [m], of a `size`
-        (own, 1) [m^D], beside the `points` of all bodies: (own, D) and (count, D) of the plan."""
-        own, D, wall = place.shape[0], self._dimensions, self.wall
-        weight = self.team.empty((own, D))
-        self.team.run(
-            self.kernels.weigh_images, own, weight, place, size, *self._corners, *wall.touching, wall.images, *points
-        )
-        (extended,) = plan.exchange([(weight, ((),) * D)])
-        return weight, extended
-
     def _find_company(self) -> None:
         """Which cells join which, and the lists of the band's, the covered and the loose cells."""
         self.wall.find_masters(self._kinds, self._masters, self._swept, self._fields)
@@ -407,7 +282,7 @@ class CutCells:
         self._run(self.fluid_kernels.take_contents, self.fluid.there, self._swept, self.wall.shape)
         mark = self.team.empty(self._band.shape[0], np.int8)
         self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
-        found = np.array([float(self._particles.rows.any(mark)), float(self._lone.shape[0])])
+        found = np.array([float(self._rows.any(mark)), float(self._lone.shape[0])])
         leaving, lone = self.blocks.communicator.maximum(found)
         if leaving > 0.0:
             self.evict()
@@ -444,33 +319,6 @@ class CutCells:
         self._band, self._covered, self._loose = lists
         self._band_cells = counts[:, 0]
         self._groups = Groups(self.team, self.kernels, self._band_cells)
-
-    def _see(self, values: Any, mean: Any) -> None:
-        """mean (band, k) of what particles have (count, k) around the cells with a wall, where they were in the middle
-        of the step: only there is the way that a turning wall went along itself."""
-        (count, width), wall = values.shape, self.wall
-        amounts = self.team.empty((count, 1 + width))
-        self.team.run(self.kernels.find_momentum, count, width, self._mass, values, amounts)
-        self.team.run(
-            self.kernels.see_particles, -(-self._walled.shape[0] // wall.lanes), self._band, self._walled, width, mean,
-            self._inertia, wall.seen, amounts.reshape(-1), self._middle, *self._middle_bins, wall.shape, wall.spacing,
-            wall.origin,
-        )  # fmt: skip
-
-    def _gather_kicks(self) -> Any:
-        """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
-        its own."""
-        own, wall, team = self.solid.count, self.wall, self.team
-        gained, home = team.empty((own, 1 + self._dimensions)), team.empty(own, np.int64)
-        chosen = wall.coarse_order(self._own_middle, *self.solid.columns.read("id"))
-        grid, homes = (self._corners[0], wall.spacing), (wall.cells, *self._homes, self.blocks.first)
-        team.run(self.kernels.find_homes, own, self.solid.start, home, *grid, *homes)
-        team.run(
-            self.kernels.gather_kicks, -(-own // wall.lanes), chosen, self._own_middle, home, self._image, gained,
-            wall.seen, wall.mark.reshape(-1), BAND, self._kick, wall.shape, *grid, wall.origin, wall.extent,
-            self._seen_cells, wall.cells,
-        )  # fmt: skip
-        return gained
 
     def _mix(self, U: Any, fraction: Any) -> None:
         """Contents of the band become states of what belongs together; covered cells rest."""
@@ -541,7 +389,7 @@ class CutCells:
         """Bytes of this rank's fields, the corners' as if they were as many as cells."""
         fields = (self.kind, self.swept, *self.wall.fractions, *self.wall.apertures)
         cells, D = self.kind.nbytes, self._dimensions
-        return sum(field.nbytes for field in fields) + cells * (2 + D + 8 * D + 2 * 8)
+        return sum(field.nbytes for field in fields) + cells * (2 + D + 8 * (1 + D) + 8)
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells in the band around the wall."""
@@ -551,8 +399,8 @@ class CutCells:
         """What a restart needs: the volumes, and the books."""
         return {
             "cells": {"swept": self.blocks.without_ghosts(self.swept.here()[:, :1])},
-            "sums": {"wall": self._wall_sums, "sides": self._through_sides.here()},
-            "values": {"way": np.array(self._thickness.way)},
+            "sums": {"wall": self._wall_sums, "sides": self._sides.passed.here()},
+            "values": {"way": np.array(self._particles.thickness.way)},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -561,19 +409,16 @@ class CutCells:
         self.swept.changed()
         self._classify()
         self._exchange_swept()
-        self._thickness.way = float(snapshot["values"]["way"])
+        self._particles.thickness.way = float(snapshot["values"]["way"])
         self._wall_sums[:] = snapshot["sums"]["wall"]
-        self._through_sides.here()[:] = snapshot["sums"]["sides"]
-        self._through_sides.changed()
+        self._sides.restore(snapshot["sums"]["sides"])
         self.wall.near.here()[:] = 1
         self.wall.near.changed()
         position, velocity = self.solid.columns.read("position", "velocity")
-        self._look(position)
-        self._cut(position, velocity)
+        self._particles.look(position)
+        self._particles.cut(position, velocity)
 
     def ledger(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
-        count, through = self.blocks.local_count, self._through_sides.here()
-        sides = np.stack([np.bincount(self._side_blocks, amounts, count) for amounts in through.T], axis=1)
-        totals = self.blocks.sum(np.hstack([self._wall_sums, sides]))
+        totals = self.blocks.sum(np.hstack([self._wall_sums, self._sides.sums()]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))
