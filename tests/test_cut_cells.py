@@ -1,5 +1,6 @@
 """Cut cells: geometry, uniform flow kept, pistons, closed books, thin plates that do not leak."""
 
+from copy import deepcopy
 from dataclasses import replace
 from itertools import product
 from math import sqrt
@@ -18,7 +19,7 @@ from distfsi.physics import apertures
 from distfsi.physics import drag as physics_drag
 from distfsi.scene import description as d
 from distfsi.scene.description import Ball, Box, HalfSpace
-from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock, speck
+from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock, sinking_plate, speck
 
 HEAVY = 1e15  # so dense that nothing changes a body's velocity
 OPEN = ("outflow", "outflow")
@@ -862,3 +863,18 @@ def test_an_exponential_wave_in_water_throws_a_plate_as_taylor_says(psi):
     time, velocity = np.array(velocity).T
     assert velocity.max() == pytest.approx(2.0 * peak * theta / mass * psi ** (psi / (1.0 - psi)), rel=0.02)
     assert time[velocity.argmax()] == pytest.approx(latest, rel=0.02)
+
+
+def test_a_restart_keeps_how_thick_bodies_are():
+    """Balls of a thin body are found anew where particles have gone far, not where a run goes on from a file."""
+    runs = [sinking_plate(1, 3, "cut_cells")[0] for _ in range(2)]
+    for _ in range(7):
+        runs[0].step()
+    kept = {name: deepcopy(part.snapshot()) for name, part in runs[0].simulation.kept().items()}
+    assert 0.0 < kept["coupling"]["values"]["way"] < 0.01  # a tenth of a cell
+    for name, part in runs[1].simulation.kept().items():
+        part.restore(kept[name])
+    for _ in range(2):
+        for run in runs:
+            run.step()
+        assert runs[0].digest() == runs[1].digest()
