@@ -319,6 +319,16 @@ def spread(begin, end, covered, passed, velocity, inertia, kick, shape):
             store(kick, at + d * cells, J[d] / inertia[n])
 
 
+@driver
+def clear(begin, end, chosen, fields, values, shape):
+    """values (blocks, fields, Z, Y, X) = 0 in the cells `chosen`."""
+    cells = shape[0] * shape[1] * shape[2]
+    for n in range(begin, end):
+        first = chosen[n] + chosen[n] // cells * (fields - 1) * cells
+        for k in range(fields):
+            store(values, first + k * cells, 0.0)
+
+
 @helper
 def three(position, p):
     """Coordinates of a particle; an unused axis has one cell, from 0 to 1."""

@@ -95,16 +95,6 @@ def find_gains(begin, end, carried, excess, shared, gains):
         gains[i, 2 * DIMENSIONS] = work
 
 
-@driver
-def clear(begin, end, band, fields, values, shape):
-    """values (blocks, fields, Z, Y, X) = 0 in the band."""
-    cells = shape[0] * shape[1] * shape[2]
-    for n in range(begin, end):
-        first = band[n] + band[n] // cells * (fields - 1) * cells
-        for k in range(fields):
-            store(values, first + k * cells, 0.0)
-
-
 @helper
 def has_wall(area, n):
     """Whether the wall passes through a cell of the band."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from distfsi.device.seam import Device, Pair
 from distfsi.kernels import coupling as kernels
-from distfsi.kernels import cut_forces, push
+from distfsi.kernels import push
 from distfsi.kernels import rows as row_kernels
 from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import GHOSTS, Blocks, Snapshot
@@ -34,7 +34,7 @@ PARTICLE_DRIVERS = (
     push.find_homes,
     push.gather_kicks,
     push.push,
-    cut_forces.clear,
+    kernels.clear,
 )
 FLUID_DRIVERS = (
     kernels.cover,
