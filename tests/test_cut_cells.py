@@ -328,6 +328,17 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
     assert all(np.abs(made).max() < 1e-13 for made in case.coupling.ledger().values())
 
 
+def test_stairs_push_a_plate_of_one_cell():
+    """Its particles are up to half a cell farther from where stairs close cells than from where cut cells are cut."""
+    plate = body(Box((0.5,), (0.6,)), 0.025, 100.0, (0.0,), stiffness=1.0)
+    regions = [(gas(1.4, 1.0, (0.0,)), None), (gas(1.4, 10.0, (0.0,)), Box((0.0,), (0.45,)))]
+    case = Coupled([plate], regions, (0.0,), (1.0,), (10,), (("wall", "wall"),), scheme="stairs")
+    for _ in range(12):
+        dt, impulse = case.step()
+    assert impulse[0] / dt > 5.0  # the pressures are 10 and 1 at the start
+    assert np.abs(case.coupling.ledger()["wall"]).max() < 1e-12
+
+
 def test_stairs_keep_uniform_flow_and_all_books():
     """Whole cells only, as a scheme to compare with."""
     n, u = 24, (1.0, 0.5)

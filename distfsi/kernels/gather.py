@@ -36,21 +36,12 @@ def bins_around(x, reach, lower, size, low, window):
 
 
 @helper
-def least_of(place, axis):
-    """Least coordinate along an axis of the points `place` (D, LANES)."""
-    least = place[axis * LANES]
+def range_of(place, axis):
+    """Least and largest coordinate along an axis of the points `place` (D, LANES)."""
+    least, most = place[axis * LANES], place[axis * LANES]
     for i in range(1, LANES):
-        least = min(least, place[axis * LANES + i])
-    return least
-
-
-@helper
-def most_of(place, axis):
-    """Largest coordinate along an axis of the points `place` (D, LANES)."""
-    most = place[axis * LANES]
-    for i in range(1, LANES):
-        most = max(most, place[axis * LANES + i])
-    return most
+        least, most = min(least, place[axis * LANES + i]), max(most, place[axis * LANES + i])
+    return (least, most)
 
 
 @helper
@@ -58,8 +49,9 @@ def bins_around_all(box, place, reach, lower, size, low, window):
     """The search cells, along three axes, of what is within `reach` [m] of one of the points `place` (D, LANES); box
     (2 D,) = least and largest of their coordinates along each axis."""
     for d in static_range(DIMENSIONS):
-        box[2 * d] = least_of(place, d)
-        box[2 * d + 1] = most_of(place, d)
+        least, most = range_of(place, d)
+        box[2 * d] = least
+        box[2 * d + 1] = most
     by, bz = (0, 1), (0, 1)
     bx = bins_between(box[0] - reach, box[1] + reach, lower[0], size, low[0], window[0])
     if DIMENSIONS > 1:

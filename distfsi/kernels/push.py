@@ -6,7 +6,7 @@ from math import floor
 
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.kernels.coupling import cell_at, home_of, three
-from distfsi.kernels.gather import are_near, least_of, most_of, put_place
+from distfsi.kernels.gather import are_near, put_place, range_of
 from distfsi.physics.immersed import immersed_weight
 from distfsi.physics.subset import static_range
 from distfsi.physics.symbols import DIMENSIONS, KICKS, LANES
@@ -26,15 +26,14 @@ def cells_around(place, radius, b, lower, spacing, origin, extent, seen_cells):
     """The cells along three axes, in the memory of block b, within `radius` of the points `place` (D, LANES)."""
     first = tuple(max(origin[b, d] - 2, seen_cells[d, 0]) for d in static_range(3))
     end = tuple(min(origin[b, d] + extent[b, d] + 2, seen_cells[d, 1]) for d in static_range(3))
-    iy, iz = (0, 1), (0, 1)
-    least, most = least_of(place, 0) - radius, most_of(place, 0) + radius
-    ix = cells_between(least, most, lower[0], spacing[0], first[0], end[0])
+    x, iy, iz = range_of(place, 0), (0, 1), (0, 1)
+    ix = cells_between(x[0] - radius, x[1] + radius, lower[0], spacing[0], first[0], end[0])
     if DIMENSIONS > 1:
-        least, most = least_of(place, 1) - radius, most_of(place, 1) + radius
-        iy = cells_between(least, most, lower[1], spacing[1], first[1], end[1])
+        y = range_of(place, 1)
+        iy = cells_between(y[0] - radius, y[1] + radius, lower[1], spacing[1], first[1], end[1])
     if DIMENSIONS > 2:
-        least, most = least_of(place, 2) - radius, most_of(place, 2) + radius
-        iz = cells_between(least, most, lower[2], spacing[2], first[2], end[2])
+        z = range_of(place, 2)
+        iz = cells_between(z[0] - radius, z[1] + radius, lower[2], spacing[2], first[2], end[2])
     return (ix, iy, iz)
 
 

@@ -113,7 +113,8 @@ class WallGeometry:
         self.ball = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h
         self._thickness = tuple(plate_share(D, (sqrt(D) + more) * h / self.radius) for more in (THIN, THICK))
         self.search = max(self.radius, self.ball + 1.05 * h)
-        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + 0.25 * h), 2.25 * h)
+        off = 0.75 * h if stairs else 0.25 * h  # how far particles may be from where cells are closed
+        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, self.ball) + off), 2.25 * h)
         self.reach = 2.5 * h + self.search  # two ghost cells, and half a cell that the wall may go in a step
         self.images = self.search + 0.5 * h
         self.touching = tuple(part * max(0.5 * h, spacing) for part in (REACHES, AWAY, ASIDE))
