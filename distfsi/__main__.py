@@ -146,8 +146,8 @@ def check(arguments: argparse.Namespace) -> None:
 
     scene = load(arguments.input, arguments.set)
 
-    from distfsi.study.bench import kept_bench
-    from distfsi.study.check import report
+    from distfsi.commands.bench import kept_bench
+    from distfsi.commands.check import report
 
     threads = arguments.threads or max(1, len(os.sched_getaffinity(0)) // arguments.ranks)
     print(report(scene, arguments.ranks, threads, kept_bench()))
@@ -177,7 +177,7 @@ def info(arguments: argparse.Namespace) -> None:
 
 def bench(arguments: argparse.Namespace) -> None:
     """Measure this machine, or what its ranks cost."""
-    from distfsi.study import bench, bench_ranks
+    from distfsi.commands import bench, bench_ranks
 
     if arguments.what == "ranks":
         bench_ranks.main(_start_ranks(), arguments.threads)
@@ -201,7 +201,7 @@ def study(arguments: argparse.Namespace) -> None:
 
 def doctor(arguments: argparse.Namespace) -> None:
     """Tell what a run would find."""
-    from distfsi.study import doctor
+    from distfsi.commands import doctor
 
     doctor.main(_start_ranks())
 

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.nvrtc import CompileError
 from distfsi.device.seam import Device
+from distfsi.diagnostics.budget import Accounts
 from distfsi.direct import arrives, refusal
 from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
@@ -23,7 +24,6 @@ from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
-from distfsi.parts.accounts import Accounts
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
 

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 import psutil
 
+from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
+from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
 from distfsi.device.cpu import Team
 from distfsi.device.seam import Device
+from distfsi.diagnostics.gauges import Gauge, gauge_of
+from distfsi.diagnostics.peaks import Peaks, schlieren
 from distfsi.errors import Diverged, StepFailed
+from distfsi.fluid.fluid import Fluid
+from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
-from distfsi.model import fluid_model, ghost_layers
 from distfsi.output.requests import Request
-from distfsi.parts.coupling import Coupling
-from distfsi.parts.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
-from distfsi.parts.fluid import Fluid
-from distfsi.parts.gauges import Gauge, gauge_of
-from distfsi.parts.peaks import Peaks, schlieren
-from distfsi.parts.solid import Solid
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
+from distfsi.solid.solid import Solid
 
 COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": Coupling}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks

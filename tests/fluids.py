@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from distfsi.model import FluidModel, fluid_model
+from distfsi.fluid.model import FluidModel, fluid_model
 from distfsi.scene.description import Fluid, IdealGas, Jwl, Phase, StiffenedGas
 
 AIR = IdealGas(1.4)

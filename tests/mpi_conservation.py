@@ -9,12 +9,12 @@ import json
 import sys
 from dataclasses import replace
 
+from distfsi.commands.bench_ranks import measure
+from distfsi.commands.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
+from distfsi.diagnostics.budget import Accounts
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
-from distfsi.parts.accounts import Accounts
 from distfsi.scene.description import Performance, Scene
 from distfsi.simulation import Simulation
-from distfsi.study.bench_ranks import measure
-from distfsi.study.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
 from mpi_rest import cells_of
 
 STEPS = 150

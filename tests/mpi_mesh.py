@@ -12,12 +12,12 @@ import numpy as np
 from distfsi.device.cpu import Team
 from distfsi.device.seam import Columns
 from distfsi.errors import Diverged
-from distfsi.kernels.particles import EXCHANGE
-from distfsi.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.mesh.exchange import GhostExchange
+from distfsi.mesh.kernels.particles import EXCHANGE
+from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.particles import ParticleExchange
 
 PADDING = {"wall": "symmetric", "symmetry": "symmetric", "periodic": "wrap", "outflow": "edge", "inflow": "edge"}

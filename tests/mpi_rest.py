@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from distfsi.diagnostics.budget import Accounts
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
-from distfsi.parts.accounts import Accounts
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from launch import ROOT

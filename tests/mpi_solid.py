@@ -11,8 +11,8 @@ import numpy as np
 from distfsi.device.cpu import Team
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
-from distfsi.parts.solid import Solid
 from distfsi.scene import description as d
+from distfsi.solid.solid import Solid
 
 COPPER_EOS = d.MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
 COPPER = d.JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)

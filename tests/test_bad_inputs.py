@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from distfsi.__main__ import main
+from distfsi.commands.check import report
 from distfsi.errors import InputError
 from distfsi.scene import load
-from distfsi.study.check import report
 from launch import ROOT
 
 INPUTS = {path.stem: path.read_text() for path in sorted((ROOT / "inputs").glob("*.toml"))}

@@ -8,6 +8,10 @@ import sys
 import numpy as np
 import pytest
 
+from distfsi.commands import bench
+from distfsi.commands.check import report
+from distfsi.commands.resources import Resources
+from distfsi.commands.works import SMALLEST, blast_on_copper, gases
 from distfsi.mesh.communicator import Communicator
 from distfsi.run import run
 from distfsi.scene import load
@@ -16,12 +20,8 @@ from distfsi.scene.description import IdealGas, Jwl, StiffenedGas
 from distfsi.scene.signals import Layout, moving_share, steps, sub_steps
 from distfsi.scene.waves import Side, meet
 from distfsi.simulation import Simulation, deal_blocks
-from distfsi.study import bench
-from distfsi.study.check import report
 from distfsi.study.exact import PureState, exact_riemann
 from distfsi.study.references import AIR, WATER_AIR
-from distfsi.study.resources import Resources
-from distfsi.study.works import SMALLEST, blast_on_copper, gases
 from launch import ROOT, run_ranks
 
 INPUTS = sorted((ROOT / "inputs").glob("*.toml"))

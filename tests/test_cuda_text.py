@@ -2,23 +2,18 @@
 
 import pytest
 
-from distfsi.kernels import (
-    bonds,
-    contact,
-    coupling,
-    cut_cells,
-    cut_fluxes,
-    cut_forces,
-    cut_geometry,
-    dust,
-    images,
-    push,
-    solid,
-    wall_distance,
-)
+from distfsi.coupling.cut_cells.kernels import dust, images, wall_distance
+from distfsi.coupling.cut_cells.kernels import fluxes as cut_fluxes
+from distfsi.coupling.cut_cells.kernels import forces as cut_forces
+from distfsi.coupling.cut_cells.kernels import geometry as cut_geometry
+from distfsi.coupling.cut_cells.kernels import redistribution as cut_cells
+from distfsi.coupling.immersed_boundary import kernels as coupling
+from distfsi.coupling.kernels import spreading as push
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
+from distfsi.solid.kernels import bonds, contact
+from distfsi.solid.kernels import pairs as solid
 from launch import ROOT
 from side_by_side import SideBySide
 

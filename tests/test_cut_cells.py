@@ -10,15 +10,15 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from distfsi.coupling.cut_cells.geometry import plane_profile
+from distfsi.coupling.cut_cells.kernels.geometry import SHUT
+from distfsi.coupling.formulas import apertures
+from distfsi.coupling.formulas import drag as physics_drag
+from distfsi.coupling.kernels.cells import FLUID
 from distfsi.device.emit import plain
-from distfsi.kernels.coupling import FLUID
-from distfsi.kernels.cut_geometry import SHUT
-from distfsi.parts import solid as solid_part
-from distfsi.parts.wall_geometry import plane_profile
-from distfsi.physics import apertures
-from distfsi.physics import drag as physics_drag
 from distfsi.scene import description as d
 from distfsi.scene.description import Ball, Box, HalfSpace
+from distfsi.solid import solid as solid_part
 from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock, sinking_plate, speck
 
 HEAVY = 1e15  # so dense that nothing changes a body's velocity

@@ -11,8 +11,8 @@ import pytest
 from distfsi.device import cpu, emit, runtime
 from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.markers import driver, helper, load, row, store, workspace
-from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import Symbol, chosen
+from distfsi.formulas.subset import static_range
+from distfsi.formulas.symbols import Symbol, chosen
 from launch import ROOT
 
 exp, floor, log, pow, sqrt = math.exp, math.floor, math.log, math.pow, math.sqrt
@@ -546,7 +546,7 @@ def test_refusals_name_the_place(function):
 
 
 def test_an_open_formula_is_refused():
-    with pytest.raises(NotInSubset, match=r"distfsi\.physics\.symbols line \d+"):
+    with pytest.raises(NotInSubset, match=r"distfsi\.formulas\.symbols line \d+"):
         text_of(early_return, {"SWITCH": False})
 
 

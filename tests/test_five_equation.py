@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from distfsi.parts.accounts import Accounts
+from distfsi.diagnostics.budget import Accounts
 from distfsi.scene.description import Box, FluidState, Region
 from fluids import AIR, TNT, WATER
 from test_tubes import PRODUCTS_AIR, STIFF, TUBES

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from distfsi.device.emit import plain
-from distfsi.physics import limiters, two_phase
-from distfsi.physics import riemann as riemann_solvers
+from distfsi.fluid.formulas import limiters
+from distfsi.fluid.formulas import riemann as riemann_solvers
+from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.scene import thermodynamics
 from fluids import AIR, MATERIALS, PAIRS, TNT, TRACE, WATER, model_of
 

@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from distfsi.coupling.kernels.cells import COVERED
 from distfsi.device.seam import Pair
+from distfsi.diagnostics.peaks import schlieren
+from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.errors import InputError
-from distfsi.kernels.coupling import COVERED
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.parts.peaks import schlieren
-from distfsi.parts.sampling import FluidSampler
-from distfsi.parts.solid import Solid
 from distfsi.run import run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
+from distfsi.solid.solid import Solid
 from launch import ROOT, run_ranks
 
 SOD, TUBE = ROOT / "inputs/sod.toml", ROOT / "inputs/steel_tube_full.toml"

@@ -10,6 +10,7 @@ import pytest
 import fake_cupy
 import mpi_gpu
 from distfsi import direct
+from distfsi.commands import works
 from distfsi.device import cuda, host
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostArray, HostRuntime
@@ -18,7 +19,6 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.run import gpu_of_rank, run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.study import works
 from launch import ROOT
 
 SCRIPT = ROOT / "tests/mpi_gpu.py"

@@ -13,15 +13,23 @@ PACKAGE = ROOT / "distfsi"
 LAYERS = (
     {"__main__"},
     {"study"},
+    {"commands"},
     {"run"},
     {"simulation", "direct"},
-    {"model", "parts"},
-    {"kernels", "mesh", "device", "output", "scene"},
-    {"physics"},
+    {"diagnostics"},
+    {"coupling"},
+    {"fluid", "solid"},
+    {"mesh", "device", "output", "scene"},
+    {"laws"},
+    {"formulas"},
     {"errors", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
-ACROSS = {"kernels": "distfsi.device.markers", "mesh": "distfsi.device.seam"}
+ACROSS = {"mesh": "distfsi.device.seam"}
+
+# Inside a folder, at any depth, formulas know formulas and laws only, and kernels these, kernels and their markers.
+FORMULAS = ("formulas", "laws")
+KERNELS = (*FORMULAS, "kernels")
 
 ONLY_IN = {
     "numba": "device",
@@ -43,6 +51,13 @@ def layer_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+def kind_of(path: Path) -> str:
+    """What a file holds: "formulas", "kernels", or "parts" of a simulation and all else."""
+    folder, *inner = (word.removesuffix(".py") for word in path.relative_to(PACKAGE).parts)
+    words = {folder, *inner} if folder != "study" else set()
+    return "formulas" if words & {*FORMULAS} else "kernels" if "kernels" in words else "parts"
+
+
 def imports_of(path: Path) -> set[str]:
     """Full dotted names of all that a file imports, at any depth of its text."""
     package = path.relative_to(ROOT).parent.parts
@@ -57,13 +72,15 @@ def imports_of(path: Path) -> set[str]:
     return names
 
 
-def allowed(layer: str, name: str) -> bool:
-    """Whether files of `layer` may import `name`."""
+def allowed(layer: str, kind: str, name: str) -> bool:
+    """Whether files of a `kind` in a `layer` may import `name`."""
     top, *inner = name.split(".")
-    if layer == "physics":
-        return top == "math" or name.startswith("distfsi.physics.")
     if top != "distfsi":
-        return ONLY_IN.get(top, layer) == layer
+        return top == "math" if kind != "parts" else ONLY_IN.get(top, layer) == layer
+    if kind == "formulas" and not {*FORMULAS} & {*inner}:
+        return False
+    if kind == "kernels" and not {*KERNELS} & {*inner}:
+        return inner[:2] == ["device", "markers"]
     target = inner[0] if inner and inner[0] in DEPTH else "__init__"
     across = ACROSS.get(layer)
     return target == layer or DEPTH[target] > DEPTH[layer] or (across is not None and name.startswith(across))
@@ -71,29 +88,36 @@ def allowed(layer: str, name: str) -> bool:
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_file_imports_only_from_the_layers_below(path):
-    assert layer_of(path) in DEPTH
-    assert not {name for name in imports_of(path) if not allowed(layer_of(path), name)}
+    layer, kind = layer_of(path), kind_of(path)
+    assert layer in DEPTH
+    assert not {name for name in imports_of(path) if not allowed(layer, kind, name)}
 
 
 @pytest.mark.parametrize(
-    ("layer", "name", "verdict"),
+    ("layer", "kind", "name", "verdict"),
     [
-        ("simulation", "distfsi.parts.fluid.Fluid", True),
-        ("parts", "distfsi.simulation", False),
-        ("parts", "distfsi.model.fluid_model", False),
-        ("kernels", "distfsi.device.markers.row", True),
-        ("kernels", "distfsi.device.cpu", False),
-        ("mesh", "distfsi.errors.InputError", True),
-        ("mesh", "mpi4py.MPI", True),
-        ("parts", "mpi4py.MPI", False),
-        ("kernels", "numba", False),
-        ("physics", "math.sqrt", True),
-        ("physics", "numpy", False),
-        ("physics", "distfsi.errors", False),
+        ("simulation", "parts", "distfsi.fluid.fluid.Fluid", True),
+        ("fluid", "parts", "distfsi.simulation", False),
+        ("fluid", "parts", "distfsi.solid.solid.Solid", False),
+        ("coupling", "parts", "distfsi.solid.solid.Solid", True),
+        ("coupling", "kernels", "distfsi.fluid.kernels.stage.place", True),
+        ("coupling", "kernels", "distfsi.fluid.fluid.Fluid", False),
+        ("solid", "kernels", "distfsi.fluid.kernels.stage.place", False),
+        ("fluid", "kernels", "distfsi.device.markers.row", True),
+        ("fluid", "kernels", "distfsi.device.cpu", False),
+        ("fluid", "kernels", "numpy", False),
+        ("mesh", "parts", "distfsi.errors.InputError", True),
+        ("mesh", "parts", "mpi4py.MPI", True),
+        ("fluid", "parts", "mpi4py.MPI", False),
+        ("fluid", "formulas", "math.sqrt", True),
+        ("fluid", "formulas", "numpy", False),
+        ("fluid", "formulas", "distfsi.errors", False),
+        ("fluid", "formulas", "distfsi.fluid.kernels.stage.place", False),
+        ("laws", "formulas", "distfsi.formulas.tensors.dot", True),
     ],
 )
-def test_the_layer_table(layer, name, verdict):
-    assert allowed(layer, name) is verdict
+def test_the_layer_table(layer, kind, name, verdict):
+    assert allowed(layer, kind, name) is verdict
 
 
 def test_the_top_of_the_repository_holds_what_the_architecture_says():

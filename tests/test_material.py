@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 
 from distfsi.device import cpu
 from distfsi.device.seam import Columns
-from distfsi.kernels.material import deform
-from distfsi.parts.materials import Materials, concrete_constants, crack_width, weibull
-from distfsi.physics import concrete, damage, strength
 from distfsi.scene import description as d
+from distfsi.solid.formulas import concrete, damage, strength
+from distfsi.solid.kernels.material import deform
+from distfsi.solid.materials import Materials, concrete_constants, crack_width, weibull
 
 STEEL = d.JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
 STEEL_EOS = d.LinearEos(160e9)

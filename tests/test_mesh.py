@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 import mpi_mesh
 from distfsi.device.cpu import Team
 from distfsi.errors import InputError
-from distfsi.kernels.particles import EXCHANGE
-from distfsi.kernels.regions import copy_regions
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, check_launcher
 from distfsi.mesh.curve import deal, morton_keys
+from distfsi.mesh.kernels.particles import EXCHANGE
+from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.regions import source_cell
 from launch import run_ranks

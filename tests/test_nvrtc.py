@@ -4,10 +4,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
-from distfsi.study import kernels, works
+from distfsi.study import kernels
 from launch import ROOT
 
 FEW = (("one gas", 1, "float32"), ("two gases", 2, "float64"), ("TNT and air", 2, "float32"))

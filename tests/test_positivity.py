@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from distfsi.parts.accounts import Accounts
+from distfsi.diagnostics.budget import Accounts
 from distfsi.scene.description import Box, FluidState, IdealGas, Performance, Region
 from fluids import AIR, WATER, model_of
 from tubes import OPEN, advance, fields, scene_of, start

@@ -5,14 +5,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from distfsi.coupling.cut_cells.kernels.redistribution import mix
 from distfsi.device import cpu
 from distfsi.device.markers import driver
-from distfsi.kernels.cut_cells import mix
-from distfsi.kernels.fluid import HALVINGS
+from distfsi.fluid.formulas.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
+from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.formulas.subset import static_range
+from distfsi.formulas.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
 from distfsi.mesh.communicator import Communicator
-from distfsi.physics.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
-from distfsi.physics.subset import static_range
-from distfsi.physics.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from fluids import MATERIALS, PAIRS, TRACE, model_of

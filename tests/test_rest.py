@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from distfsi.device.markers import helper
-from distfsi.kernels import fluid as kernels
+from distfsi.fluid.kernels import stage as kernels
 from launch import ROOT
 from mpi_rest import SCENES, cells_of, digest, follow, simulation_of
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from distfsi.device import cpu
-from distfsi.physics import pair, rotation, smoothing, solid_eos, strength
+from distfsi.solid.formulas import pair, rotation, smoothing, solid_eos, strength
 
 INF = math.inf
 # shear modulus, A, B, n, C, m, reference rate, room, melt, heat capacity, Taylor-Quinney

@@ -10,8 +10,12 @@ import pytest
 from llvmlite.binding import get_host_cpu_features
 from numba import typeof
 
+from distfsi.coupling.cut_cells.kernels import forces as cut_forces
+from distfsi.coupling.cut_cells.kernels import wall_distance
+from distfsi.coupling.kernels import spreading as push
 from distfsi.device import emit, runtime
-from distfsi.kernels import cut_forces, fluid, peaks, push, wall_distance
+from distfsi.diagnostics.kernels import peaks
+from distfsi.fluid.kernels import stage as fluid
 from fluids import model_of
 
 pytestmark = pytest.mark.skipif(

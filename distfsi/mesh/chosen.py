@@ -37,8 +37,8 @@ class ChosenGhosts:
     """Fills chosen ghost cells of fields, all fields in one message per other rank. What an inflow fills is let be."""
 
     def __init__(self, exchange: GhostExchange, device: Device, kernels: SimpleNamespace) -> None:
-        """`kernels`: copy_cells, pack_cells and unpack_cells of kernels/regions.py, and those of kernels/rows.py that
-        `Rows` needs, as built by the device that holds the fields."""
+        """`kernels`: copy_cells, pack_cells and unpack_cells of mesh/kernels/regions.py, and those of
+        mesh/kernels/rows.py that `Rows` needs, as built by the device that holds the fields."""
         blocks = exchange.blocks
         self._communicator, self._device, self._kernels = blocks.communicator, device, kernels
         self._cells, rows = int(np.prod(blocks.shape)), Rows(device, kernels)

@@ -13,10 +13,9 @@ import numpy as np
 from distfsi.device.seam import Columns, Device, Pair
 from distfsi.errors import InputError
 from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.kernels.particles import IMAGES
 from distfsi.mesh.route import Route
 from distfsi.mesh.rows import Rows, chunks
-
-IMAGES = 8  # an id and its images: bit a of an image's number says that it is mirrored along axis a
 
 # How a value changes in an image: "position" is mirrored about the plane; otherwise, for each component, the axes whose
 # reflection changes its sign: scalar ((),), vector ((0,), (1,)), symmetric tensor xx, yy, xy ((0, 0), (1, 1), (0, 1)).
@@ -27,7 +26,8 @@ class ParticleExchange:
     """Brings particles, and copies of them, to the ranks that need them."""
 
     def __init__(self, blocks: Blocks, device: Device, kernels: SimpleNamespace) -> None:
-        """`kernels`: those of kernels/rows.py and kernels/particles.py as built by the device of the particles."""
+        """`kernels`: those of mesh/kernels/rows.py and mesh/kernels/particles.py as built by the device of the
+        particles."""
         self.blocks, self.device, self.kernels = blocks, device, kernels
         self.rows = Rows(device, kernels)
         grid = blocks.grid

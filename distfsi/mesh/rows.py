@@ -17,7 +17,7 @@ class Rows:
     """What a part asks of the rows of its arrays; only numbers per chunk of rows get to the host."""
 
     def __init__(self, device: Device, kernels: SimpleNamespace):
-        """`kernels`: the drivers of kernels/rows.py as built by the device."""
+        """`kernels`: the drivers of mesh/kernels/rows.py as built by the device."""
         self.device, self._kernels = device, kernels
 
     def largest(self, values: Any, least: float) -> float:

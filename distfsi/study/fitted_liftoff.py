@@ -25,7 +25,7 @@ from distfsi.study.fitted_cylinder import (
     flux,
     mirrored,
     one_sided,
-)  # fmt: skip
+)
 
 HEIGHT = 0.2  # of the channel
 ROWS_BELOW, ROWS_ABOVE = 0.25, 0.5  # over the cells around half the cylinder

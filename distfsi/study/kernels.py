@@ -16,19 +16,19 @@ from typing import Any
 
 import numpy as np
 
+from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
-from distfsi.kernels.fluid import advance_tiles
-from distfsi.kernels.regions import pack_cells, unpack_cells
-from distfsi.kernels.rows import pack_rows
+from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.kernels.regions import pack_cells, unpack_cells
+from distfsi.mesh.kernels.rows import pack_rows
 from distfsi.scene import load
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
-from distfsi.study import works
 
 REALS = ("float64", "float32")
 INPUTS = Path("inputs")

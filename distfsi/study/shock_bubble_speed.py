@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import prod
 
+from distfsi.commands.bench import time_loop
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.study.bench import time_loop
 from distfsi.study.references import SHOCK_BUBBLE_SPEEDS, MeshSpeed
 from distfsi.study.shock_bubble import INPUT
 

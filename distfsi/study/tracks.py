@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import FieldWriter
 from distfsi.output.progress import Progress
-from distfsi.parts.sampling import FluidSampler
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation
 

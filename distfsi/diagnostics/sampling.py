@@ -1,0 +1,82 @@
+"""Values of the fluid at points, with the same bits on any number of ranks."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.kernels.cells import COVERED
+from distfsi.fluid.fluid import Fluid
+from distfsi.mesh.regions import source_cell
+
+AXES = "xyz"
+
+
+class FluidSampler:
+    """The fluid at fixed points, linear between the centers of cells in each coordinate.
+
+    Covered cells do not count; a point in a covered cell has no value (NaN). Beyond the outermost centers the values
+    are those that the boundary implies: at a wall the normal velocity goes to zero.
+
+    columns: names and units of the values
+    """
+
+    def __init__(self, fluid: Fluid, coupling: Coupling | None, positions: np.ndarray):
+        """`positions` (n, D) [m] inside the domain."""
+        self.fluid, self.coupling = fluid, coupling
+        self._primitives = fluid.model.formula("primitives")
+        D, grid = fluid.model.dimensions, fluid.blocks.grid
+        self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in AXES[:D])]
+        self.columns += ["volume_fraction"] if fluid.model.phases == 2 else []
+        place = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
+        low = np.floor(place)
+        corners = np.array(list(product((0, 1), repeat=D)))
+        share = (place - low)[:, None]
+        self._weight = np.where(corners == 1, share, 1.0 - share).prod(axis=2)
+        self._home = self._weight.argmax(axis=1)  # the corner in whose cell the point is
+        self._find_cells(low.astype(np.int64)[:, None] + corners)
+
+    def _find_cells(self, corner: np.ndarray) -> None:
+        """Number the distinct cells at the corners (n, 2^D, D), and find those on this rank."""
+        blocks, grid = self.fluid.blocks, self.fluid.blocks.grid
+        cell, self._sign = np.zeros((*corner.shape[:2], 3), dtype=np.int64), np.ones(corner.shape)
+        for axis in range(corner.shape[2]):
+            n = grid.cells[axis]
+            sources = np.array([source_cell(i, n, grid.boundaries[axis]) for i in range(-1, n + 1)])
+            cell[..., axis] = sources[corner[..., axis] + 1, 0]
+            self._sign[..., axis] = 1 - 2 * sources[corner[..., axis] + 1, 1]
+        cells, number = np.unique(cell.reshape(-1, 3), axis=0, return_inverse=True)
+        self._number = number.reshape(corner.shape[:2])
+        block = blocks.index_at(cells // blocks.block_cells) - blocks.first
+        self._own = np.flatnonzero((block >= 0) & (block < blocks.local_count))
+        block = block[self._own]
+        x, y, z = (cells[self._own] - blocks.origin[block] + grid.ghosts).T
+        self._place = (block, slice(None), z, y, x)
+
+    def values(self) -> np.ndarray:
+        """Collective. The values (n, columns) at the points, on every rank."""
+        D, P, fluid = self.fluid.model.dimensions, self.fluid.model.phases, self.fluid
+        covered = self.coupling.kind.here()[self._place] >= COVERED if self.coupling else np.zeros((len(self._own), 1))
+        rows = np.hstack([self._own[:, None], fluid.state[self._place], covered], dtype=np.float64)
+        rows = fluid.blocks.communicator.concatenate(rows)
+        rows = rows[np.argsort(rows[:, 0])]
+        U, covered = np.ascontiguousarray(rows[:, 1:-1].T), rows[:, -1] == 1.0
+        W = self._primitives(U)
+        fraction = U[-1:] if P == 2 else U[:0]
+        cells = np.stack([W[P + D], U[:P].sum(axis=0), *W[P : P + D], *fraction], axis=1)
+        return self._interpolated(cells, covered)
+
+    def _interpolated(self, cells: np.ndarray, covered: np.ndarray) -> np.ndarray:
+        """Values (n, columns) at the points from those in the cells; a uniform state keeps its bits."""
+        D, points = self._sign.shape[2], np.arange(len(self._number))
+        around = cells[self._number]
+        around[..., 2 : 2 + D] *= self._sign
+        covered = covered[self._number]
+        weight = np.where(covered, 0.0, self._weight)[..., None]
+        home = around[points, self._home]
+        with np.errstate(invalid="ignore"):
+            values = home + (weight * (around - home[:, None])).sum(axis=1) / weight.sum(axis=1)
+        values[covered[points, self._home]] = np.nan
+        return values

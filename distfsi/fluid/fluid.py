@@ -1,0 +1,392 @@
+"""The fluid: its state on this rank's blocks, and what one Runge-Kutta stage does to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from distfsi.device.seam import Device, Pair
+from distfsi.errors import Diverged
+from distfsi.fluid.initial import InitialState
+from distfsi.fluid.kernels import stage as kernels
+from distfsi.fluid.rest import Rest
+from distfsi.mesh.blocks import Blocks, Snapshot
+from distfsi.mesh.exchange import GhostExchange
+from distfsi.mesh.kernels.regions import copy_regions
+from distfsi.scene.description import Scene
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a Runge-Kutta method: U_new = U_n + b (U - dt D(U) - U_n); `weight`: its share in the whole step."""
+
+    number: int
+    b: float
+    weight: float
+
+
+SSP_RK2 = (Stage(0, 1.0, 0.5), Stage(1, 0.5, 0.5))  # Gottlieb, Shu, Tadmor, SIAM Rev. 43, 2001
+SSP_RK3 = (Stage(0, 1.0, 1.0 / 6.0), Stage(1, 0.25, 1.0 / 6.0), Stage(2, 2.0 / 3.0, 2.0 / 3.0))  # paper, Eq. 16
+SCHEMES = {"rk2": SSP_RK2, "rk3": SSP_RK3}
+
+
+def _output(number: int) -> int:
+    """Which buffer a stage writes: 1 and 2 in turn, never the one it reads nor the state before the step."""
+    return 1 + number % 2
+
+
+class Fluid:
+    """Compressible flow on the blocks of this rank.
+
+    state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
+    step. stages: those that make a step.
+    """
+
+    def __init__(self, scene: Scene, model, blocks: Blocks, team: Device):
+        self.model, self.blocks, self.team = model, blocks, team
+        self.stages = SCHEMES[scene.time.scheme]
+        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
+        real = scene.fluid.precision
+        self.kernels = team.build(
+            [kernels.advance_tiles, kernels.fastest_signals], model.constants, model.bindings, real
+        )
+        buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
+        initial = InitialState(scene.fluid, model)
+        self.inflow = self._inflow_states(scene, initial)
+        for buffer in buffers:
+            buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
+        initial.paint(blocks, buffers[0])
+        self._buffers = [Pair(team, buffer) for buffer in buffers]
+        self._lay_tiles(team.tile_cells(scene.performance.tile_cells))
+        self._extent = team.array(blocks.extent)
+        self._fastest = Pair(team, np.zeros(blocks.local_count))
+        self._before = self._booked()
+        self._signal: float | None = None
+        self.volumes = Pair(team, np.ones((1, 1, 1, 1, 1), real))
+        self.rejected_steps = 0
+
+    def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
+        states = np.zeros((3, 2, self.model.variables))
+        for axis, sides in enumerate(scene.fluid.inflow):
+            for side, state in enumerate(sides):
+                if state is not None:
+                    states[axis, side] = initial.of(state)
+        return states
+
+    def _lay_tiles(self, tile_cells: tuple[int, ...]) -> None:
+        """Cut the blocks into tiles; those whose ghosts come from other ranks are computed last."""
+        blocks, grid = self.blocks, self.blocks.grid
+        size = [min(t, n) for t, n in zip((*tile_cells, 1, 1)[:3], blocks.block_cells, strict=True)]
+        rows, places = [], []
+        for block in range(blocks.local_count):
+            extent, origin = blocks.extent[block], blocks.origin[block]
+            starts = [range(0, extent[axis], size[axis]) for axis in range(3)]
+            for z in starts[2]:
+                for y in starts[1]:
+                    for x in starts[0]:
+                        first = np.array([x, y, z])
+                        cells = np.minimum(size, extent - first)
+                        rows.append([block, *(first + grid.ghosts), *cells, self._sides(origin + first, cells)])
+                        places.append(origin + first)
+        self.tiles = np.array(rows, dtype=np.int64).reshape(-1, 8)
+        waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
+        self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
+        self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
+        self._table = self.team.array(self.tiles)
+        self._through = Pair(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
+        self._limited = Pair(self.team, np.zeros(len(self.tiles), dtype=np.int64))
+        self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
+
+    def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
+        """Bits of the domain's sides that a tile touches; a periodic side is no side."""
+        grid, bits = self.blocks.grid, 0
+        for axis in range(grid.dimensions):
+            for side, touches in enumerate((first[axis] == 0, first[axis] + cells[axis] == grid.cells[axis])):
+                if touches and grid.boundaries[axis][side] != "periodic":
+                    bits |= 1 << (2 * axis + side)
+        return bits
+
+    # ---- one step ----------------------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> np.ndarray:
+        return self._buffers[0].here()
+
+    @property
+    def there(self) -> Any:
+        """The state at the present time on the device."""
+        return self._buffers[0].there
+
+    def changed(self) -> None:
+        """The state on the host has been changed."""
+        self._buffers[0].changed()
+
+    @property
+    def previous(self) -> Any:
+        """The state before the last step on the device, until the next one begins."""
+        return self._buffers[1].read
+
+    def input_of(self, stage: Stage) -> Any:
+        """The state that a stage starts from, on the device."""
+        return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].there
+
+    def output_of(self, stage: Stage) -> Any:
+        """Where a stage leaves its state; asked before the stage."""
+        return self._buffers[_output(stage.number)].there
+
+    def begin_step(self) -> None:
+        """Remember what `reject` must bring back besides the state."""
+        self._before = self._booked()
+        self._signal = None
+
+    def reject(self) -> None:
+        """Go back to the state before the last step."""
+        self._buffers[:2] = self._buffers[1::-1]
+        for pair, before in zip((self._through, self._limited), self._before, strict=True):
+            pair.here()[:] = before
+            pair.changed()
+        self.rejected_steps += 1
+        self._signal = None
+        self.rest.wake()
+
+    def is_valid(self) -> bool:
+        """Collective. Whether all cells of all ranks have a valid state."""
+        self._signal = self.fastest_signal()
+        return bool(np.isfinite(self.blocks.communicator.maximum(np.array([self._signal]))[0]))
+
+    def _booked(self) -> tuple[np.ndarray, np.ndarray]:
+        """Copies of what has left through the domain's sides, and of the number of limited faces."""
+        return self._through.here().copy(), self._limited.here().copy()
+
+    def exchange_ghosts(self, stage: Stage) -> None:
+        """Fill the ghost cells of the stage's input."""
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.exchange.finish()
+
+    def advance_stage(self, stage: Stage, dt: float) -> None:
+        """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
+        self.rest.begin_stage()
+        self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.advance_tiles(self._ready_tiles, stage, dt)
+        self.exchange.finish()
+        self.advance_tiles(self._waiting_tiles, stage, dt)
+        self.rest.stages = self.team.get(self._stages)
+        self.rest.end_stage()
+        if stage is self.stages[-1]:
+            new = self._buffers.pop(_output(stage.number))
+            self._buffers.insert(0, new)
+
+    def advance_tiles(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
+        """Advance the tiles of the given numbers by one stage; those that are calm only if their fluxes are booked."""
+        tiles = tiles[~self.rest.calm[tiles] | (self.tiles[tiles, kernels.SIDES] > 0)]
+        output, chosen = self._buffers[_output(stage.number)], self.team.array(tiles)
+        real = output.dtype.type
+        self.team.run(
+            self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
+            self._buffers[0].there, self.input_of(stage), output.there, self.volumes.there, self._through.there,
+            self._limited.there, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
+        )  # fmt: skip
+
+    def rates(self, dt: float) -> list:
+        """dt/h [s/m] along each of three axes, in the fluid's precision."""
+        real = self._buffers[0].dtype.type
+        return [real(dt / h) for h in self.blocks.grid.spacing]
+
+    def wake(self, blocks: np.ndarray) -> None:
+        """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
+        true; to be called before the next stage."""
+        self.rest.wake(blocks[self.tiles[:, kernels.BLOCK]])
+        self._signal = None
+
+    def fastest_signal(self) -> float:
+        """Largest sum over axes of (|u| + c)/h [1/s] on this rank: CFL number per time step. NaN when a cell has no
+        valid state."""
+        if self._signal is not None:
+            return self._signal
+        if not self.blocks.local_count:
+            return 0.0
+        real = self._buffers[0].dtype.type
+        inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
+        changed = np.unique(self.tiles[~self.rest.settled, kernels.BLOCK])
+        self.team.run(
+            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].there,
+            self._first_active(), self._extent, *inverse, self._fastest.there,
+        )  # fmt: skip
+        return float(np.max(self._fastest.here()))
+
+    @property
+    def signals(self) -> np.ndarray:
+        """(local blocks,) the last fastest signal [1/s] of each block."""
+        return self._fastest.here()
+
+    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple, str]:
+        """The fastest of `signals`, those of this rank's blocks before the last step, where its block begins in the
+        grid, and its cell in words. Of equal ones that whose block comes last along z, y, x."""
+        if not self.blocks.local_count:
+            return 0.0, (), ""
+        block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
+        before = self.team.get(self.previous[block : block + 1])[(0, *self._inside(block))]
+        with np.errstate(all="ignore"):
+            W = self.model.formula("primitives")(before.astype(np.float64))
+            c = self.model.formula("sound_speed")(W)
+        axes = range(self.model.dimensions)
+        speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
+        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
+        cell = np.unravel_index(np.nanargmax(signal), signal.shape)
+        place = self._place(block, cell)
+        text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({place}) m"
+        return float(signals[block]), tuple(self.blocks.origin[block, ::-1].tolist()), text
+
+    def _place(self, block: int, cell: tuple) -> str:
+        """The center of the cell (z, y, x) of a local block, in words."""
+        centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
+        return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
+
+    def _first_active(self) -> int:
+        gx, gy, gz = self.blocks.grid.ghosts
+        _, size_y, size_x = self.blocks.shape
+        return (gz * size_y + gy) * size_x + gx
+
+    # ---- looking at it -----------------------------------------------------------------------------------------------
+
+    def cells(self, block: int) -> np.ndarray:
+        """View (variables, z, y, x) of the active cells of a local block."""
+        return self.active(self.state, block)
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        return {
+            "cells": {"state": self.blocks.without_ghosts(self.state)},
+            "sums": {
+                "through": self._through.here(),
+                "limited": self._limited.here().astype(np.float64),
+                "rested": self.rest.counts[None],
+            },
+            "values": {"rejected_steps": np.array(self.rejected_steps)},
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
+        self._through.here()[:] = snapshot["sums"]["through"]
+        self._limited.here()[:] = snapshot["sums"]["limited"]
+        for pair in (self._buffers[0], self._through, self._limited):
+            pair.changed()
+        self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
+        self.rejected_steps, self._signal = int(snapshot["values"]["rejected_steps"]), None
+        self.rest.wake()
+
+    def workload(self) -> np.ndarray:
+        """(local blocks,) cells that a stage computes."""
+        cells = self.tiles[:, [kernels.NX, kernels.NY, kernels.NZ]].prod(axis=1) * ~self.rest.settled
+        return np.bincount(self.tiles[:, kernels.BLOCK], cells, self.blocks.local_count)
+
+    def memory(self) -> int:
+        """Bytes of this rank's fields."""
+        return sum(buffer.nbytes for buffer in self._buffers)
+
+    def limited_faces(self) -> int:
+        """Collective. How many faces had their flux limited so far, over all stages; those at the high sides of the
+        domain are not counted."""
+        return int(self.blocks.communicator.concatenate(self._limited.here()).sum())
+
+    def share_at_rest(self) -> float:
+        """Collective. The part of all tile stages in which the tile was at rest."""
+        rested, everything = self.blocks.communicator.concatenate(self.rest.counts[None]).sum(axis=0)
+        return rested / max(everything, 1)
+
+    def totals(self, volume: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Masses, momentum and energy (conserved,) of all ranks' cells, and the sums of their absolute values.
+
+        volume (local blocks, Z, Y, X): the part of each cell that fluid fills, by default all.
+        """
+        sums = self._contents(volume)
+        totals = self.blocks.sum(sums.reshape(len(sums), 2 * self.model.conserved))
+        return totals[: self.model.conserved], totals[self.model.conserved :]
+
+    def _contents(self, volume: np.ndarray | None) -> np.ndarray:
+        """Of each block (local blocks, 2, conserved) what totals() are of all."""
+        sums = np.zeros((self.blocks.local_count, 2, self.model.conserved))
+        for block in range(self.blocks.local_count):
+            cells = self.cells(block)[: self.model.conserved].astype(np.float64)
+            if volume is not None:
+                part = self.active(volume, block).astype(np.float64)
+                cells = np.where(part > 0.0, part * cells, 0.0)
+            sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
+        return sums * self._cell_volume()
+
+    def leave(self, volume: np.ndarray) -> None:
+        """Book all that the cells hold in this `volume` (local blocks, Z, Y, X) as having left the domain."""
+        _, first = np.unique(self.tiles[:, kernels.BLOCK], return_index=True)
+        self._through.here()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
+        self._through.changed()
+
+    def left_domain(self) -> np.ndarray:
+        """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""
+        through = self._through.here()
+        signed = through[:, 1::2].sum(axis=1) - through[:, 0::2].sum(axis=1)
+        sums = np.zeros((self.blocks.local_count, self.model.conserved))
+        np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)
+        return self.blocks.sum(sums * self._cell_volume())
+
+    def outputs(self, covered: np.ndarray | None = None, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Fields for the output files: (local blocks, bz, by, bx[, 3]), padded to whole blocks, NaN where covered.
+
+        `chosen`: the local blocks wanted, by default all.
+        """
+        chosen = np.arange(self.blocks.local_count) if chosen is None else chosen
+        names = ["density", "velocity", "pressure"] + (["volume_fraction"] if self.model.phases == 2 else [])
+        shape = (len(chosen), *self.blocks.block_cells[::-1])
+        fields = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in names}
+        primitives, P, D = self.model.formula("primitives"), self.model.phases, self.model.dimensions
+        for row, block in enumerate(chosen):
+            U = self.cells(block).astype(np.float64)
+            W = primitives(U)
+            z, y, x = U.shape[1:]
+            values = {"density": U[:P].sum(axis=0), "pressure": W[P + D], "volume_fraction": U[-1]}
+            for name in names:
+                part = fields[name][row, :z, :y, :x]
+                if name == "velocity":
+                    part[..., :D] = np.stack(W[P : P + D], axis=-1)
+                else:
+                    part[:] = values[name]
+                if covered is not None:
+                    part[self.active(covered, block)] = np.nan
+        return fields
+
+    def check(self, time: float, covered: np.ndarray | None = None) -> None:
+        """Raise Diverged with place, time and state when a cell of this rank, not `covered`, has no valid state."""
+        for block in range(self.blocks.local_count):
+            with np.errstate(all="ignore"):
+                W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
+                c = np.asarray(self.model.formula("sound_speed")(tuple(W)))
+            valid = np.isfinite(c) & np.isfinite(W).all(axis=0)
+            if covered is not None:
+                valid |= self.active(covered, block)
+            if not valid.all():
+                z, y, x = np.argwhere(~valid)[0]
+                where = f"at t = {time:.6g} s in the cell at ({self._place(block, (z, y, x))}) m"
+                values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
+                state = ", ".join(f"{name} {value:.6g}" for name, value in values)
+                raise Diverged(f"the fluid has no valid state {where}: {state}")
+
+    def _names(self) -> list[str]:
+        """Of the primitives."""
+        phases, axes = range(self.model.phases), "xyz"[: self.model.dimensions]
+        fraction = ["volume fraction"] if self.model.phases == 2 else []
+        return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), "pressure", *fraction]
+
+    def active(self, field: np.ndarray, block: int) -> np.ndarray:
+        """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""
+        return field[(block, *self._inside(block))]
+
+    def _inside(self, block: int) -> tuple:
+        """Where the active cells of a local block are in what is stored of it."""
+        n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
+        return (..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))
+
+    def _cell_volume(self) -> float:
+        return float(np.prod(self.blocks.grid.spacing[: self.model.dimensions]))

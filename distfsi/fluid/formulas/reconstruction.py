@@ -1,0 +1,63 @@
+"""How a primitive varies inside a cell: from the means of cells in a row, its own in their middle, to its two faces.
+
+Each formula returns (rise from the low face to the mean, rise from the mean to the high face). A volume fraction may be
+reconstructed more sharply than the rest: phase densities, velocity and pressure are primitives beside it, so masses and
+energies of the phases follow it, and where velocity and pressure are uniform they stay so.
+"""
+
+from distfsi.formulas.subset import static_range
+from distfsi.formulas.symbols import GHOSTS, limited_slope
+
+UNEVEN = 1e-6  # of all three roughnesses: what weighs as none; so that no unit matters
+LEAST_PART = 0.1  # of a cell's mean that a face keeps where the cells around have one sign
+
+
+def differences(cells):
+    """To the cell before, and to the one behind."""
+    return (cells[GHOSTS - 1] - cells[GHOSTS - 2], cells[GHOSTS] - cells[GHOSTS - 1])
+
+
+def muscl(cells):
+    """A straight line with a limited slope."""
+    backward, forward = differences(cells)
+    rise = 0.5 * limited_slope(backward, forward)
+    return (rise, rise)
+
+
+def overbee(cells):
+    """The steepest straight line within the range of the neighbours, flat at extrema (Chiapolino, Saurel, Nkonga, J.
+    Comput. Phys. 340, 2017). A steeper profile, as THINC's can be, could empty a cell of a phase in one step."""
+    backward, forward = differences(cells)
+    smaller = min(abs(backward), abs(forward))
+    rise = smaller if backward > 0.0 else -smaller
+    kept = rise if backward * forward > 0.0 else 0.0
+    return (kept, kept)
+
+
+def curved_rise(d1, d2, d3, d4):
+    """From a cell's mean to its face, between the cells whose difference is d3; d1 … d4: between five cells in a row.
+
+    Of fifth order where the primitive is smooth (WENO-Z: Borges, Carmona, Costa, Don, J. Comput. Phys. 227, 2008).
+    """
+    rough1 = 13.0 / 12.0 * ((d2 - d1) * (d2 - d1)) + 0.25 * ((3.0 * d2 - d1) * (3.0 * d2 - d1))
+    rough2 = 13.0 / 12.0 * ((d3 - d2) * (d3 - d2)) + 0.25 * ((d2 + d3) * (d2 + d3))
+    rough3 = 13.0 / 12.0 * ((d4 - d3) * (d4 - d3)) + 0.25 * ((3.0 * d3 - d4) * (3.0 * d3 - d4))
+    even = UNEVEN * (rough1 + rough2 + rough3) + 1e-30
+    uneven = abs(rough1 - rough3)
+    ratio1, ratio2, ratio3 = uneven / (rough1 + even), uneven / (rough2 + even), uneven / (rough3 + even)
+    weight1, weight2 = 0.1 * (1.0 + ratio1 * ratio1), 0.6 * (1.0 + ratio2 * ratio2)
+    weight3 = 0.3 * (1.0 + ratio3 * ratio3)
+    total = weight1 * (5.0 * d2 - 2.0 * d1) + weight2 * (d2 + 2.0 * d3) + weight3 * (4.0 * d3 - d4)
+    return total / (6.0 * (weight1 + weight2 + weight3))
+
+
+def weno5(cells):
+    """Five cells; a straight line where a face would come near zero or beyond, and the cells do not."""
+    d1, d2, d3, d4 = tuple(cells[k + 1] - cells[k] for k in static_range(4))
+    mean = cells[2]
+    low, high = curved_rise(d4, d3, d2, d1), curved_rise(d1, d2, d3, d4)
+    straight = 0.5 * limited_slope(d2, d3)
+    one_sign = min(cells[1] * mean, mean * cells[3]) > 0.0
+    least = LEAST_PART * (mean * mean)
+    crosses_low, crosses_high = (mean - low) * mean < least, (mean + high) * mean < least
+    return (straight if one_sign and crosses_low else low, straight if one_sign and crosses_high else high)

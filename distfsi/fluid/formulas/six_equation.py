@@ -1,0 +1,240 @@
+"""The six-equation model of two compressible materials with one velocity and, after relaxation, one pressure.
+
+Stored state U = (a1 rho1, a2 rho2, rho u (DIMENSIONS), rho E, a1); primitive state W = (rho1, rho2, u (DIMENSIONS), p,
+a1). Phase energies live inside a stage and are reset from rho E (Saurel, Petitpas, Berry, J. Comput. Phys. 228, 2009;
+paper, Eqs. 9-30). At faces the velocity components are rotated so that the normal one comes first.
+"""
+
+from math import sqrt
+
+from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_change
+from distfsi.fluid.formulas.riemann import contact_speed
+from distfsi.formulas.subset import static_range
+from distfsi.formulas.symbols import (
+    CLOSED_FORM,
+    DIMENSIONS,
+    FLUXES,
+    GRAVITY,
+    MINIMUM_FRACTION,
+    OMEGA_1,
+    OMEGA_2,
+    VARIABLES,
+    bounding_speeds,
+    contact_jump_diffusion,
+    reference_1,
+    reference_2,
+    slip_viscosity,
+    state_behind_wave,
+    stored_reference_1,
+    stored_reference_2,
+)
+
+
+def primitives(U):
+    """Primitive state of a relaxed conserved one; the pressure from the total energy (paper, Eq. 29)."""
+    a1 = U[3 + DIMENSIONS]
+    a2 = 1.0 - a1
+    rho1 = U[0] / a1
+    rho2 = U[1] / a2
+    rho = U[0] + U[1]
+    velocity = tuple(U[2 + d] / rho for d in static_range(DIMENSIONS))
+    kinetic = 0.5 * sum(U[2 + d] * velocity[d] for d in static_range(DIMENSIONS))
+    reference1, slope1 = stored_reference_1(rho1)
+    reference2, slope2 = stored_reference_2(rho2)
+    energy = U[2 + DIMENSIONS] - kinetic + a1 * (reference1 / OMEGA_1) + a2 * (reference2 / OMEGA_2)
+    p = energy / (a1 * (1.0 / OMEGA_1) + a2 * (1.0 / OMEGA_2))
+    return (rho1, rho2, *(velocity[d] for d in static_range(DIMENSIONS)), p, a1)
+
+
+def conserved(W):
+    """Stored state of a primitive one."""
+    a1 = W[3 + DIMENSIONS]
+    m1 = a1 * W[0]
+    m2 = (1.0 - a1) * W[1]
+    return (m1, m2, *((m1 + m2) * W[2 + d] for d in static_range(DIMENSIONS)), total_energy(W), a1)
+
+
+def total_energy(W):
+    """rho E [J/m3]."""
+    a1 = W[3 + DIMENSIONS]
+    a2 = 1.0 - a1
+    p = W[2 + DIMENSIONS]
+    reference1, slope1 = stored_reference_1(W[0])
+    reference2, slope2 = stored_reference_2(W[1])
+    internal = a1 * ((p - reference1) / OMEGA_1) + a2 * ((p - reference2) / OMEGA_2)
+    squared = sum(W[2 + d] * W[2 + d] for d in static_range(DIMENSIONS))
+    return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared
+
+
+def phase_energies(W):
+    """alpha_k rho_k e_k [J/m3] of both phases."""
+    a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
+    ref1, slope1 = reference_1(W[0])
+    ref2, slope2 = reference_2(W[1])
+    return (a1 * ((p - ref1) * (1.0 / OMEGA_1)), (1.0 - a1) * ((p - ref2) * (1.0 / OMEGA_2)))
+
+
+def bulk_modulus(W):
+    """rho c^2 [Pa] of the frozen mixture: a1 rho1 c1^2 + a2 rho2 c2^2 (paper, Eqs. 22, 23)."""
+    a1 = W[3 + DIMENSIONS]
+    a2 = 1.0 - a1
+    p = W[2 + DIMENSIONS]
+    reference1, slope1 = reference_1(W[0])
+    reference2, slope2 = reference_2(W[1])
+    bulk1 = W[0] * slope1 + (p - reference1) + OMEGA_1 * p
+    bulk2 = W[1] * slope2 + (p - reference2) + OMEGA_2 * p
+    return a1 * bulk1 + a2 * bulk2
+
+
+def sound_speed(W):
+    """Frozen speed of sound c^2 = Y1 c1^2 + Y2 c2^2 (paper, Eq. 22)."""
+    return sqrt(bulk_modulus(W) / mixture_density(W))
+
+
+def mixture_density(W):
+    """rho = a1 rho1 + a2 rho2 [kg/m3]."""
+    return W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
+
+
+def energy_behind_wave(rho, p, chi, reference, reference_behind, OMEGA):
+    """rho e of one phase behind a wave that compresses it by chi: the phase's own Hugoniot (in place of Eq. 27).
+
+    The pressure grows without bound at the limiting compression; beyond 0.9 of it the denominator is held.
+    """
+    y = 1.0 / chi
+    growth = max(y - 0.5 * OMEGA * (1.0 - y), 0.1 * y)
+    p_behind = (p - reference + reference_behind * y + 0.5 * OMEGA * p * (1.0 - y)) / growth
+    return (p_behind - reference_behind) / OMEGA
+
+
+def behind_wave(W, s, u_face):
+    """All that is transported, per volume, behind a wave of speed s that changes the normal velocity to u_face.
+
+    The stored state, both phase energies, and 1 for the volume itself.
+    """
+    a1, u, p = W[3 + DIMENSIONS], W[2], W[2 + DIMENSIONS]
+    a2 = 1.0 - a1
+    rho = a1 * W[0] + a2 * W[1]
+    chi = (s - u) / (s - u_face)  # compression; 1 if no wave passes
+    energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
+    rho1, rho2 = chi * W[0], chi * W[1]
+    before1, slope1 = reference_1(W[0])
+    before2, slope2 = reference_2(W[1])
+    behind1, slope1b = reference_1(rho1)
+    behind2, slope2b = reference_2(rho2)
+    mass1, mass2 = a1 * rho1, a2 * rho2
+    mass = mass1 + mass2
+    return (
+        mass1,
+        mass2,
+        mass * u_face,
+        *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
+        energy,
+        a1,
+        a1 * energy_behind_wave(W[0], p, chi, before1, behind1, OMEGA_1),
+        a2 * energy_behind_wave(W[1], p, chi, before2, behind2, OMEGA_2),
+        1.0,
+    )
+
+
+def face_flux(left, right, jump):
+    """Fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27); in the
+    five-equation model without phase energies.
+
+    Everything is smeared alike (fluid/formulas/riemann.py), so that pressure and velocity stay uniform across an
+    interface. jump [Pa]: the largest pressure difference along the face.
+    """
+    rho_l, u_l, p_l, c_l = mixture_density(left), left[2], left[2 + DIMENSIONS], sound_speed(left)
+    rho_r, u_r, p_r, c_r = mixture_density(right), right[2], right[2 + DIMENSIONS], sound_speed(right)
+    s_l, s_r = bounding_speeds(rho_l, u_l, c_l, rho_r, u_r, c_r)
+    s_star = contact_speed(rho_l, u_l, p_l, s_l, rho_r, u_r, p_r, s_r)
+
+    from_left = s_star >= 0.0
+    W = tuple(left[v] if from_left else right[v] for v in static_range(VARIABLES))
+    there = tuple(right[v] if from_left else left[v] for v in static_range(VARIABLES))
+    rho = rho_l if from_left else rho_r
+    s, s_there = s_l if from_left else s_r, s_r if from_left else s_l
+    subsonic = s_l < 0.0 if from_left else s_r > 0.0
+    u, p = W[2], W[2 + DIMENSIONS]
+    u_face = s_star if subsonic else u
+    p_face = p + rho * (s - u) * (u_face - u)
+    U, U_there = state_behind_wave(W, s, u_face), state_behind_wave(there, s_there, s_star)
+
+    reach = s if subsonic else 0.0
+    kappa = contact_jump_diffusion(reach, s_there, s_star)
+    bulk = min(rho_l * (c_l * c_l), rho_r * (c_r * c_r))
+    viscosity = slip_viscosity(rho_l * (s_l - u_l), rho_r * (s_r - u_r), jump, bulk)
+    F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(FLUXES))
+    slip = tuple(right[2 + d] - left[2 + d] for d in static_range(DIMENSIONS))
+    work = 0.5 * sum(slip[d] * (right[2 + d] + left[2 + d]) for d in static_range(1, DIMENSIONS))
+    return (
+        F[0],
+        F[1],
+        F[2] + p_face,
+        *(F[2 + d] - viscosity * slip[d] for d in static_range(1, DIMENSIONS)),
+        F[2 + DIMENSIONS] + p_face * u_face - viscosity * work,
+        *(F[v] for v in static_range(3 + DIMENSIONS, FLUXES)),
+    )
+
+
+def updated_conserved(U_n, U, D, b, dt):
+    """U_n + b (U - D + dt S - U_n) of masses, momentum and total energy; S is the body force and its work."""
+    rho = U[0] + U[1]
+    work = sum(GRAVITY[d] * U[2 + d] for d in static_range(DIMENSIONS))
+    return (
+        U_n[0] + b * (U[0] - D[0] - U_n[0]),
+        U_n[1] + b * (U[1] - D[1] - U_n[1]),
+        *(
+            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (GRAVITY[d] * rho) - U_n[2 + d])
+            for d in static_range(DIMENSIONS)
+        ),
+        U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS]),
+    )
+
+
+def before_relaxation(U_n, U, W, D, b, dt):
+    """Where both phases stand after a stage (relaxation.py), and by how much transport has changed a1.
+
+    Phase energies obey the paper's Eq. 15 (sign corrected); rho E is the conserved energy, from which they are reset
+    (Eq. 30).
+    """
+    W_n = primitives(U_n)
+    p_n, a1_n = W_n[2 + DIMENSIONS], U_n[3 + DIMENSIONS]
+    p, a1 = W[2 + DIMENSIONS], W[3 + DIMENSIONS]
+    a2_n, a2, du = 1.0 - a1_n, 1.0 - a1, D[VARIABLES + 2]
+
+    m1, m2 = tuple(U_n[k] + b * (U[k] - D[k] - U_n[k]) for k in static_range(2))
+    da = b * (a1 - D[3 + DIMENSIONS] + a1 * du - a1_n)
+    da = min(max(da, MINIMUM_FRACTION - a1_n), (1.0 - MINIMUM_FRACTION) - a1_n)
+    reference1_n, slope1_n = reference_1(W_n[0])
+    reference2_n, slope2_n = reference_2(W_n[1])
+    reference1, slope1 = reference_1(W[0])
+    reference2, slope2 = reference_2(W[1])
+    e1_n, e1 = a1_n * ((p_n - reference1_n) / OMEGA_1), a1 * ((p - reference1) / OMEGA_1)
+    e2_n, e2 = a2_n * ((p_n - reference2_n) / OMEGA_2), a2 * ((p - reference2) / OMEGA_2)
+    de1 = b * (e1 - D[VARIABLES] + a1 * p * -du - e1_n)
+    de2 = b * (e2 - D[VARIABLES + 1] + a2 * p * -du - e2_n)
+    phases = phases_before(p_n, a1_n + da, da, m1, m2, reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2)
+    return (phases, da)
+
+
+def fraction_after(U_n, change):
+    """a1 after its change in a stage."""
+    return min(max(U_n[3 + DIMENSIONS] + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
+
+
+def updated(U_n, U, W, D, b, dt):
+    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), then a1 moves until both phases share a pressure; with JWL a
+    value behind the state that is negative where they do not yet.
+
+    D is dt times the divergence of the fluxes. Everything is written as a change of U_n, so that a uniform state stays
+    as it is to the bit.
+    """
+    phases, da = before_relaxation(U_n, U, W, D, b, dt)
+    relaxed, settled = relaxed_fraction_change(phases)
+    new = updated_conserved(U_n, U, D, b, dt)
+    state = (*(new[v] for v in static_range(3 + DIMENSIONS)), fraction_after(U_n, da + relaxed))
+    if CLOSED_FORM:
+        return state
+    else:
+        return (*(state[v] for v in static_range(VARIABLES)), settled)

@@ -1,0 +1,126 @@
+"""The fluid's state before the first step: regions painted over each other, cell by cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from distfsi.device.emit import plain
+from distfsi.fluid.formulas import relaxation, six_equation
+from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.mesh.blocks import Blocks
+from distfsi.scene.description import Fluid, FluidState
+from distfsi.scene.shapes import cell_fractions, contains
+
+ALIKE = 1e-9  # part by which pressures differ that are one
+
+
+class InitialState:
+    """Conserved states of the scene's regions, for one or two phases.
+
+    A region is one phase. With two phases the other one is present in it, too, as much as the region's state says or as
+    a trace of `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives
+    for it.
+    """
+
+    def __init__(self, fluid: Fluid, model):
+        self.fluid, self.model = fluid, model
+        self._conserved, self._primitives = (model.formula(name) for name in ("conserved", "primitives"))
+        if model.phases == 2:
+            formulas = (six_equation.phase_energies, relaxation.phases_before, relaxation.relaxed_fraction_change)
+            self._energies, self._before, self._change, self._range, self._halved = (
+                plain(formula, model.constants, model.bindings)
+                for formula in (*formulas, relaxation.range_of_change, relaxation.halved_range)
+            )
+
+    def of(self, state: FluidState) -> np.ndarray:
+        """Conserved state (variables,) of a region or an inflow."""
+        densities = [state.density] if self.model.phases == 1 else self._densities(state)
+        fraction = [] if self.model.phases == 1 else [self._fraction(state)]
+        return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
+
+    def paint(self, blocks: Blocks, field: np.ndarray) -> None:
+        """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part
+        holds that part of the region's mass, momentum and energy; two materials have come to one pressure in it."""
+        dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
+        states = [self.of(region.state) for region in self.fluid.regions]
+        for block in range(blocks.local_count):
+            centers = blocks.cell_centers(block)[:dimensions]
+            active = (slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True))
+            cells = field[(block, slice(None), *active)]
+            for region, state in zip(self.fluid.regions, states, strict=True):
+                new = state[:, None, None, None]
+                if region.shape is None:
+                    cells[:] = new
+                    continue
+                part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
+                mixed = part * new + (1.0 - part) * cells
+                if self.model.phases == 2:
+                    cut = np.argwhere((part > 0.0) & (part < 1.0))
+                    alike = self._alike(state[:, None], cells[:, *cut.T])
+                    for at in map(tuple, cut[~alike]):
+                        mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
+                cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
+
+    def _pressure(self, U: np.ndarray) -> np.ndarray:
+        return self._primitives(U)[self.model.phases + self.model.dimensions]
+
+    def _alike(self, new: np.ndarray, old: np.ndarray) -> np.ndarray:
+        """Where two states have one pressure."""
+        pressure, other = self._pressure(new), self._pressure(old)
+        return np.abs(pressure - other) <= ALIKE * np.abs(other)
+
+    def _mixed(self, new: np.ndarray, old: np.ndarray, part: float) -> np.ndarray:
+        """State (variables,) of a cell of which a `part` holds one state and the rest another. At one pressure and the
+        density of its region, a material that came from a high pressure would be colder than cold."""
+        states, shares = (new, old), np.array((part, 1.0 - part))
+        primitives = [self._primitives(U) for U in states]
+        lowest, U = min(self._pressure(state) for state in states), shares @ np.array(states)
+        energies = shares @ np.array([self._energies(W) for W in primitives])
+        fractions = (U[-1], 1.0 - U[-1])
+        references = [eos.evaluate(m / a)[0] for eos, m, a in zip(self.model.eos, U[:2], fractions, strict=True)]
+        excess = [
+            eos.omega * energy - a * (lowest - reference)
+            for eos, energy, a, reference in zip(self.model.eos, energies, fractions, references, strict=True)
+        ]
+        phases = self._before(lowest, U[-1], 0.0, U[0], U[1], *references, *excess)
+        change, settled = self._change(phases)
+        if settled < 0.0:
+            low, high = self._range(U[-1])
+            for _ in range(HALVINGS):
+                low, high = self._halved(phases, low, high)
+            change = 0.5 * (low + high)
+        U[-1] += change
+        return U
+
+    def at(self, positions: np.ndarray) -> np.ndarray:
+        """States (variables, n) at points (n, D) [m]."""
+        states = np.empty((self.model.variables, len(positions)))
+        for region in self.fluid.regions:
+            inside = np.s_[:] if region.shape is None else contains(region.shape, positions)
+            states[:, inside] = self.of(region.state)[:, None]
+        return states
+
+    def _fraction(self, state: FluidState) -> float:
+        given = state.volume_fraction
+        other = self.fluid.minimum_volume_fraction if given is None else 1.0 - given
+        return 1.0 - other if state.phase == 0 else other
+
+    def _densities(self, state: FluidState) -> list[float]:
+        other = 1 - state.phase
+        known = next((r.state for r in self.fluid.regions if r.state.phase == other), None)
+        trace = state.density if known is None else self._on_isentrope(other, known, state.pressure)
+        return [state.density, trace] if state.phase == 0 else [trace, state.density]
+
+    def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
+        """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""
+        eos = self.model.eos[phase]
+
+        def slope(p, rho):
+            reference, gradient = eos.evaluate(rho[0])
+            return [1.0 / (gradient + (p - reference + eos.omega * p) / rho[0])]
+
+        if pressure == known.pressure:
+            return known.density
+        path = solve_ivp(slope, (known.pressure, pressure), [known.density], method="LSODA", rtol=1e-9, atol=1e-12)
+        return float(path.y[0, -1])

@@ -1,0 +1,349 @@
+// The loops of fluid/kernels/stage.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
+//
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, FINISHES, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
+
+// ---- tuples and arrays ------------------------------------------------------------------------------------------------
+
+template <class... R> DEVICE Tuple<real, R...> joined(real first, Tuple<R...> rest) { return {first, rest}; }
+
+// The N values from `values` on, `step` apart.
+template <int N, int K = 0> DEVICE auto tuple_of(const real *values, int step = 1)
+{
+    if constexpr (K == N)
+        return Tuple<>{};
+    else
+        return joined(values[K * step], tuple_of<N, K + 1>(values, step));
+}
+
+DEVICE void put(Tuple<>, real *, long long) {}
+
+template <class... R> DEVICE void put(Tuple<real, R...> tuple, real *values, long long step)
+{
+    *values = tuple.head;
+    put(tuple.tail, values + step, step);
+}
+
+DEVICE constexpr bool is_velocity(int v) { return v >= PHASES && v < PHASES + DIMENSIONS; }
+
+// The variable that stands at place v when the velocity along `axis` comes first, and where variable v stands then.
+DEVICE constexpr int rotated(int v, int axis)
+{
+    return is_velocity(v) ? PHASES + (v - PHASES + axis) % DIMENSIONS : v;
+}
+DEVICE constexpr int place(int v, int axis)
+{
+    return is_velocity(v) ? PHASES + (v - PHASES + DIMENSIONS - axis) % DIMENSIONS : v;
+}
+
+#ifdef HAS_TILE_X
+
+// ---- a tile in shared memory ------------------------------------------------------------------------------------------
+
+constexpr int GY = DIMENSIONS > 1 ? GHOSTS : 0, GZ = DIMENSIONS > 2 ? GHOSTS : 0;
+constexpr int PX = TILE_X + 2 * GHOSTS, PY = TILE_Y + 2 * GY, PLANE = PX * PY;
+constexpr int SLOTS = DIMENSIONS > 2 ? 2 * GHOSTS : 1;  // planes of cells that are kept: those a flux along z reads
+constexpr int SP = SLOTS * PLANE;
+constexpr int ROW = TILE_X + 1;  // of faces
+constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
+constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
+constexpr real LEAST_VOLUME = HALF;
+constexpr int HALVINGS = 80;
+constexpr int KEPT = DIMENSIONS > 2 && PHASES > 1 ? 3 * FLUXES * THREADS : 0;  // what registers do not hold
+constexpr int APART = KEPT > 0 ? THREADS : 1;  // the values of a thread
+static_assert(SHARED == VARIABLES * SP + FLUXES * FACES + KEPT && THREADS == TILE_X * TILE_Y, "as the launch assumes");
+
+// P of a cell of the tile; k counts planes, of which the last SLOTS are there.
+DEVICE int cell(int i, int j, int k) { return (SLOTS > 1 ? (k + SLOTS) % SLOTS : 0) * PLANE + (j + GY) * PX + i + GHOSTS; }
+
+template <int AXIS> DEVICE int cell_along(int i, int j, int k, int steps)
+{
+    return cell(AXIS == 0 ? i + steps : i, AXIS == 1 ? j + steps : j, AXIS == 2 ? k + steps : k);
+}
+
+template <int AXIS> DEVICE real largest_jump(const real *p, int i, int j, int k)
+{
+    const real here = p[cell(i, j, k)];
+    return maximum(magnitude(p[cell_along<AXIS>(i, j, k, 1)] - here), magnitude(here - p[cell_along<AXIS>(i, j, k, -1)]));
+}
+
+// The largest pressure difference between the face's two cells and those beside them.
+template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int k)
+{
+    constexpr int FIRST = AXIS == 0 ? 1 : 0, SECOND = AXIS == 2 ? 1 : 2;
+    const int ni = i + (AXIS == 0), nj = j + (AXIS == 1), nk = k + (AXIS == 2);
+    real jump = maximum(largest_jump<FIRST>(p, i, j, k), largest_jump<FIRST>(p, ni, nj, nk));
+    if constexpr (DIMENSIONS > 2)
+        jump = maximum(jump, maximum(largest_jump<SECOND>(p, i, j, k), largest_jump<SECOND>(p, ni, nj, nk)));
+    return jump;
+}
+
+// How far variable v rises from the low face of a cell to its mean and from there to its high face.
+template <int AXIS> DEVICE auto rises(const real *W, bool sharp, int i, int j, int k)
+{
+    real values[2 * GHOSTS - 1];
+#pragma unroll
+    for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = W[cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
+    const auto cells = tuple_of<2 * GHOSTS - 1>(values);
+    return SHARPENED && sharp ? sharpened(cells) : reconstructed(cells);
+}
+
+// Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
+// cell * dt/h. Whether it was limited.
+template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real rate, real *F, int step)
+{
+    real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
+    const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
+#pragma unroll
+    for (int v = 0; v < VARIABLES; v++) {
+        const real *W = P + rotated(v, AXIS) * SP;
+        const bool sharp = v == VARIABLES - 1;
+        low_mean[v] = W[low], high_mean[v] = W[high];
+        left[v] = W[low] + item<1>(rises<AXIS>(W, sharp, i, j, k));
+        right[v] = W[high] - item<0>(rises<AXIS>(W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+    }
+    real jump = 0;
+    if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
+    const auto L = tuple_of<VARIABLES>(left), R = tuple_of<VARIABLES>(right);
+    put(face_flux(L, R, jump), F, step);
+    for (int v = 0; v < FLUXES; v++) value[v] = F[v * step];
+    const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
+    const auto f = tuple_of<FLUXES>(value);
+    real c = minimum(sound_speed(L), sound_speed(R));
+    if constexpr (CURVED) c = minimum(c, minimum(sound_speed(l), sound_speed(r)));
+    if (!(reserve(l, r, f, c, rate) < 0) || is_admissible(l, r, f, rate)) return false;
+    put(limited_flux(l, r, f, jump, rate), F, step);
+    return true;
+}
+
+// P = primitives of plane k of the cells at U, with n x m cells and their ghosts.
+DEVICE void load_plane(const real *U, real *P, int k, int n, int m, int tx, int ty, long long sy, long long sz, long long su)
+{
+    for (int j = ty - GY; j < m + GY; j += TILE_Y) {
+        for (int i = tx - GHOSTS; i < n + GHOSTS; i += TILE_X) {
+            const real *u = U + k * sz + j * sy + i;
+            real state[VARIABLES];
+#pragma unroll
+            for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
+            put(primitives(tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
+        }
+    }
+}
+
+// Whether a box of n x m x l cells at U holds one state: a part of the answer, for the cells of this thread.
+DEVICE bool is_unlike(const real *U, const real *first, int n, int m, int l, int tx, int ty, long long sy, long long sz,
+                      long long su)
+{
+    for (int v = 0; v < VARIABLES; v++) {
+        const real value = first[v * su];
+        for (int k = 0; k < l; k++)
+            for (int j = ty; j < m; j += TILE_Y)
+                for (int i = tx; i < n; i += TILE_X)
+                    if (U[v * su + k * sz + j * sy + i] != value) return true;
+    }
+    return false;
+}
+
+// Add the flux through n faces of a domain side, `step` apart, to what has left through it; and that of as many `rows`
+// as are alike. Always in the same order.
+DEVICE void book(double *through, const real *F, int axis, int step, int n, int rows, double weight)
+{
+    for (int v = threadIdx.x; v < CONSERVED; v += THREADS) {
+        const real *values = F + place(v, axis) * FACES;
+        real total = values[0];
+#pragma unroll 1
+        for (int i = 1; i < n; i++) total = total + values[i * step];
+#pragma unroll 1
+        for (int row = 0; row < rows; row++) through[v] += total * weight;
+    }
+}
+
+// U_new = one Runge-Kutta stage of a cell, relaxed to the end. (A template: not every scene has all these formulas.)
+template <class... T> DEVICE void advance(Tuple<T...> before, Tuple<T...> now, Tuple<T...> W, auto D, real b, real dt,
+                                          real *U_new, long long su)
+{
+    const auto state = updated(before, now, W, D, b, dt);
+    if constexpr (!FINISHES) {
+        put(state, U_new, su);
+    } else {
+        real values[VARIABLES + 1];
+        put(state, values, 1);
+#pragma unroll
+        for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
+        if (values[VARIABLES] >= 0) return;
+        const auto start = before_relaxation(before, now, W, D, b, dt);
+        auto range = range_of_change(item<1>(item<0>(start)));
+#pragma unroll 1
+        for (int n = 0; n < HALVINGS; n++) range = halved_range(item<0>(start), item<0>(range), item<1>(range));
+        U_new[(VARIABLES - 1) * su] = fraction_after(before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+    }
+}
+
+// columns of the tile table
+enum { BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES };
+
+extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PARAMETERS)
+{
+    DYNAMIC_SHARED(shared);
+    real *P = (real *)shared, *F = P + VARIABLES * SP;
+    const int tx = threadIdx.x % TILE_X, ty = threadIdx.x / TILE_X;
+    const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
+    const long long at = begin + blockIdx.x;
+    const long long t = chosen[at], *tile = tiles + t * tiles_1;
+    const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
+    const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
+    const bool is_calm = calm[t];
+    bool uniform = is_calm;
+    if (!is_calm) {
+        const real *corner = U + u0 - GZ * sz - GY * sy - GHOSTS;
+        const bool unlike = is_unlike(corner, corner, nx + 2 * GHOSTS, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
+                            || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
+        uniform = __syncthreads_count(unlike) == 0;
+    }
+    const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
+    const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
+    const bool inside = tx < n && ty < m;
+    double *out = through + t * 6 * CONSERVED;
+    real own[3 * FLUXES], *const kept = KEPT > 0 ? F + FLUXES * FACES + threadIdx.x : own;
+    // what leaves the cell, and the fluxes along z at its low and its high side
+    real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
+    const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * cx, ry = sides_of_cell * cy, rz = sides_of_cell * cz;
+    int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
+
+    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
+    __syncthreads();
+    if constexpr (DIMENSIONS > 2) {
+        if (inside) count += flux<2>(P, tx, ty, -1, rz, low, APART);
+        if (sides & 16) {
+            if (inside)
+                for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
+            __syncthreads();
+            for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+        }
+        __syncthreads();
+    }
+    for (int k = 0; k < l; k++) {
+        if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
+        if (ty < m)
+            for (int i = tx; i < n + 1; i += TILE_X)
+                count += flux<0>(P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
+        __syncthreads();
+        if (inside) {
+#pragma unroll
+            for (int v = 0; v < FLUXES; v++) {
+                const real *f = F + v * FACES + ty * ROW + tx;
+                D[v * APART] = (f[1] - f[0]) * cx;
+            }
+        }
+        for (int j = 0; j < m; j++) {
+            if (sides & 1) book(out, F + j * ROW, 0, step, 1, x_alike, weight * cx);
+            if (sides & 2) book(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, weight * cx);
+        }
+        if constexpr (DIMENSIONS > 1) {
+            __syncthreads();
+            if (tx < n)
+                for (int j = ty; j < m + 1; j += TILE_Y)
+                    count += flux<1>(P, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
+            __syncthreads();
+            if (inside) {
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) {
+                    const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
+                    D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * cy;
+                }
+            }
+            if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
+            if (sides & 8) book(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, weight * cy);
+        }
+        if constexpr (DIMENSIONS > 2) {
+            if (inside) {
+                count += flux<2>(P, tx, ty, k, rz, high, APART) && k < l - 1;
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++)
+                    D[v * APART] = D[v * APART] + (high[place(v, 2) * APART] - low[place(v, 2) * APART]) * cz;
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) low[v * APART] = high[v * APART];
+            }
+            if ((sides & 32) && k == l - 1) {
+                __syncthreads();
+                if (inside)
+                    for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v * APART];
+                __syncthreads();
+                for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+            }
+        }
+        if (inside) {
+            const long long u = u0 + k * sz + ty * sy + tx;
+            real before[VARIABLES], now[VARIABLES];
+#pragma unroll
+            for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
+            if constexpr (FRACTIONAL) {
+                const real volume = volumes[u - tile[BLOCK] * (VARIABLES - volumes_1) * su];
+                const real concentration = 1 / maximum(volume, LEAST_VOLUME);
+#pragma unroll
+                for (int v = 0; v < FLUXES; v++) D[v * APART] = D[v * APART] * concentration;
+            }
+            const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
+            const auto divergence = tuple_of<FLUXES>(D, APART);
+            advance(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
+        }
+        __syncthreads();
+    }
+    bool unchanged = uniform;
+    for (int v = 0; v < VARIABLES && uniform; v++) {
+        const real value = U_new[u0 + v * su];
+        unchanged = unchanged && U[u0 + v * su] == value && U_n[u0 + v * su] == value;
+        for (int k = 0; k < nz && !is_calm; k++)
+            for (int j = ty; j < ny; j += TILE_Y)
+                for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
+    }
+    long long *counts = (long long *)shared;
+    counts[threadIdx.x] = count;
+    __syncthreads();
+    if (threadIdx.x > 0) return;
+    for (int thread = 0; thread < THREADS; thread++) limited[t] += counts[thread];
+    stages[t] = unchanged ? stages[t] + 1 : 0;
+}
+
+#else
+
+// ---- the fastest signal -----------------------------------------------------------------------------------------------
+
+extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(PARAMETERS)
+{
+    __shared__ real largest[THREADS];
+    const real rates[3] = {rx, ry, rz};
+    const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
+    const long long at = begin + blockIdx.x;
+    const long long block = chosen[at], nx = extent[3 * block], ny = extent[3 * block + 1], nz = extent[3 * block + 2];
+    const real *first = U + block * VARIABLES * su + start;
+    real most = 0, invalid = 0;
+    for (long long cell = threadIdx.x; cell < nx * ny * nz; cell += THREADS) {
+        const real *u = first + cell / (nx * ny) * sz + cell / nx % ny * sy + cell % nx;
+        real state[VARIABLES];
+#pragma unroll
+        for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
+        const auto W = primitives(tuple_of<VARIABLES>(state));
+        const real c = sound_speed(W);
+        real w[VARIABLES];
+        put(W, w, 1);
+        real signal = (magnitude(w[PHASES]) + c) * rates[0];
+        for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
+        real lightest = state[0];
+        for (int phase = 1; phase < PHASES; phase++) lightest = minimum(lightest, state[phase]);
+        signal = signal + (square_root(lightest) - square_root(lightest));
+        most = maximum(most, signal);
+        invalid = invalid + (signal - signal);
+    }
+    largest[threadIdx.x] = most + invalid;
+    for (int half = THREADS / 2; half > 0; half /= 2) {
+        __syncthreads();
+        if (threadIdx.x < half) {
+            const real mine = largest[threadIdx.x], other = largest[threadIdx.x + half];
+            largest[threadIdx.x] = other <= mine || mine != mine ? mine : other;
+        }
+    }
+    if (threadIdx.x == 0) fastest[block] = largest[0];
+}
+
+#endif

@@ -1,0 +1,168 @@
+"""From the words of a scene to formulas: the only place where a name in the input meets a function.
+
+A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one description in scene/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, singledispatch
+
+import numpy as np
+
+from distfsi.device.emit import plain
+from distfsi.device.fold import Bound
+from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
+from distfsi.fluid.formulas import six_equation as two_phase
+from distfsi.laws.fluid import jwl, stiffened_gas
+from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
+
+RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
+    "first_order": (reconstruction.muscl, limiters.first_order, 2),
+    "minmod": (reconstruction.muscl, limiters.minmod, 2),
+    "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
+    "weno5": (reconstruction.weno5, limiters.van_leer, 3),
+}
+RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
+    "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
+    "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
+    "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
+    "adaptive": (riemann.einfeldt_speeds, riemann.sharp, riemann.shear_along_shocks),
+}
+TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equation, 1)}  # fluxes beyond the state's
+
+
+@dataclass(frozen=True)
+class FluidEos:
+    """p = reference(rho) + omega rho e, as a formula with its constants."""
+
+    reference: Bound
+    omega: float
+    closed_form: bool
+
+    def evaluate(self, rho: float) -> tuple[float, float]:
+        """Reference pressure [Pa] and its slope with density, outside the kernels."""
+        return self._plain_reference(rho)
+
+    @cached_property
+    def _plain_reference(self) -> Callable[[float], tuple[float, float]]:
+        return plain(self.reference.function, self.reference.constants)
+
+
+@singledispatch
+def fluid_eos(eos: object) -> FluidEos:
+    """The formula of an equation of state of the input."""
+    raise TypeError(f"no formula for {eos}")
+
+
+@fluid_eos.register
+def _(eos: IdealGas) -> FluidEos:
+    return fluid_eos(StiffenedGas(eos.gamma, 0.0))
+
+
+@fluid_eos.register
+def _(eos: StiffenedGas) -> FluidEos:
+    return FluidEos(Bound(stiffened_gas.reference, {"GAMMA": eos.gamma, "P_INF": eos.p_inf}), eos.gamma - 1.0, True)
+
+
+@fluid_eos.register
+def _(eos: Jwl) -> FluidEos:
+    constants = {"RHO0": eos.rho0, "A": eos.A, "B": eos.B, "R1": eos.R1, "R2": eos.R2, "OMEGA": eos.omega}
+    return FluidEos(Bound(jwl.reference, constants), eos.omega, False)
+
+
+@dataclass(frozen=True)
+class FluidModel:
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables.
+
+    mirror: per variable the axis whose reflection changes its sign, -1 for none.
+    """
+
+    constants: dict[str, object]
+    bindings: dict[str, Bound]
+    eos: tuple[FluidEos, ...]
+    dimensions: int
+
+    @property
+    def phases(self) -> int:
+        return len(self.eos)
+
+    @property
+    def variables(self) -> int:
+        return self.constants["VARIABLES"]
+
+    @property
+    def conserved(self) -> int:
+        """Masses, momentum and energy; the volume fraction behind them is not conserved."""
+        return self.phases + self.dimensions + 1
+
+    @property
+    def mirror(self) -> np.ndarray:
+        axes = np.full(self.variables, -1, dtype=np.int64)
+        axes[self.phases : self.phases + self.dimensions] = np.arange(self.dimensions)
+        return axes
+
+    def formula(self, name: str):
+        """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
+        return plain(self.bindings[name].function, self.constants, self.bindings)
+
+
+def fluid_model(scene: Scene) -> FluidModel:
+    """The formulas and constants of the scene's fluid."""
+    fluid: Fluid = scene.fluid
+    dimensions, phases = scene.domain.dimensions, len(fluid.phases)
+    eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
+    variables = phases + dimensions + 1 + (phases == 2)
+    model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
+    reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
+    curved = reconstructed is reconstruction.weno5
+    constants = {
+        "DIMENSIONS": dimensions,
+        "PHASES": phases,
+        "VARIABLES": variables,
+        "FLUXES": variables + more_fluxes,
+        "GRAVITY": scene.gravity,
+        "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
+        "CLOSED_FORM": all(e.closed_form for e in eos),
+        "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
+        "GHOSTS": ghosts,
+        "SHARPENED": phases == 2 and (fluid.sharpening or curved),
+        "CURVED": curved,
+        "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
+    } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
+    names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
+    bindings = {name: Bound(getattr(model, name)) for name in names}
+    if constants["FINISHES"]:
+        bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
+        bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
+    bindings["state_behind_wave"] = Bound(model.behind_wave)
+    bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
+    bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
+    bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
+    solver = zip(
+        ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
+    )
+    bindings |= {name: Bound(function) for name, function in solver}
+    bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
+    bindings |= {f"stored_reference_{k}": reference for k, reference in enumerate(_stored_references(fluid, eos), 1)}
+    return FluidModel(constants, bindings, eos, dimensions)
+
+
+def ghost_layers(scene: Scene) -> int:
+    """Layers of ghost cells on each side of a block that the scene's method asks for."""
+    return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
+
+
+def _stored_references(fluid: Fluid, eos: tuple[FluidEos, ...]) -> list[Bound]:
+    """In float32 the energies of stiffened gases are counted from those of their first state without pressure."""
+    found = []
+    for k, (phase, formula) in enumerate(zip(fluid.phases, eos, strict=True)):
+        first = next((region.state for region in fluid.regions if region.state.phase == k), None)
+        shifted = fluid.precision == "float32" and isinstance(phase.eos, StiffenedGas) and first is not None
+        rest = {"REST_DENSITY": first.density} if shifted else {}
+        found.append(
+            Bound(stiffened_gas.shifted_reference, formula.reference.constants | rest) if shifted else formula.reference
+        )
+    return found

@@ -1,0 +1,106 @@
+"""Which particles are near which: a table of neighbours, found with a search grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from distfsi.device.seam import Device
+from distfsi.mesh import search
+from distfsi.mesh.kernels import rows as row_kernels
+from distfsi.mesh.particles import GhostPlan, Parity
+from distfsi.mesh.rows import Rows
+from distfsi.solid.kernels import pairs as kernels
+
+DRIVERS = (*search.DRIVERS, kernels.find_neighbours, kernels.place_among, row_kernels.find_largest)
+
+
+@dataclass
+class Near:
+    """A rank's own particles, then ghosts, then images, as a step finds them; arrays are the device's.
+
+    plan      how values of own particles get to the ghosts and images
+    position  (count, D) [m]
+    state     (count, 4 + D) the columns of solid/kernels/pairs.py
+    support   how far the widest kernel of all ranks reaches [m]
+    told      what the solid's form wants to know of ghosts and images besides
+    flags     the largest of each of the form's flags over all ranks
+    """
+
+    plan: GhostPlan
+    position: Any
+    state: Any
+    support: float
+    told: list[Any]
+    flags: np.ndarray
+
+    @property
+    def own(self) -> int:
+        return self.plan.own
+
+    @property
+    def vector(self) -> Parity:
+        """How the components of a vector change in an image."""
+        return tuple((a,) for a in range(self.position.shape[1]))
+
+    @property
+    def matrix(self) -> Parity:
+        """How the components of a matrix, row by row, change in an image."""
+        axes = range(self.position.shape[1])
+        return tuple((a, b) for a in axes for b in axes)
+
+    @property
+    def tensor(self) -> Parity:
+        """How the components of a symmetric tensor change in an image."""
+        axes = range(self.position.shape[1])
+        return tuple((a, a) for a in axes) + tuple((a, b) for a in axes for b in axes if a < b)
+
+
+class NeighbourSearch:
+    """Finds neighbours with a grid of search cells from the corner `lower` to `upper` [m], the same on all ranks.
+
+    table  (own, width) int32, on the device: the neighbours of each particle, search cell by search cell, in the order
+           of their keys
+    count  (own,): how many there are
+    """
+
+    def __init__(self, kernels: SimpleNamespace, device: Device, lower: tuple[float, ...], upper: tuple[float, ...]):
+        """`kernels` holds DRIVERS."""
+        self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
+        self._cells = search.CellSort(kernels, device, lower, upper)
+        self._width = 4 * 6 ** (len(lower) - 1)
+        self.table, self.count = device.empty((0, self._width), np.int32), device.empty(0, np.int64)
+        self._found = self.table  # by the last find(); used again, as fresh memory costs more than the search
+
+    def find(self, own: int, position: Any, state: Any, key: Any, size: float) -> None:
+        """Find the neighbours, closer than h_i + h_j, of the first `own` particles, with search cells of `size` [m].
+
+        The table lasts until the next call.
+        """
+        cell, cells = self._cells.sort(position, key, size)
+        across = self._cells.strides[1 : position.shape[1]]  # rows of three cells lie along x
+        rows = np.array([np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))], dtype=np.int64)
+        near = (position, state, cell, cells.start, cells.order, self._device.array(np.sort(rows)))
+        self.count = self._device.empty(own, np.int64)
+        while True:
+            if self._found.shape != (own, self._width):
+                self._found = self._device.empty((own, self._width), np.int32)
+            self.table = self._found
+            self._device.run(self._kernels.find_neighbours, own, *near, self.table, self.count)
+            most = self._rows.largest(self.count, 0)
+            if most <= self._width:
+                return
+            self._width = int(1.2 * most)
+
+    def find_among(self, rows: Any, own: int, position: Any, state: Any, key: Any, size: float) -> None:
+        """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;
+        the others have no neighbours."""
+        chosen = int(np.searchsorted(self._device.get(rows), own))
+        self.find(chosen, *(self._rows.taken(array, rows) for array in (position, state, key)), size)
+        table, count = self._device.empty((own, self._width), np.int32), self._device.zeros(own, np.int64)
+        self._device.run(self._kernels.place_among, chosen, rows, self.table, self.count, table, count)
+        self.table, self.count = table, count

@@ -1,0 +1,350 @@
+"""The solid: smoothed particles, their motion and their books (paper, Sec. 2.1 and Appendix A).
+
+How particles act on each other is a matter of the solid's form: updated.py, bonds.py. A step needs three or four
+messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the corrected stress, the
+new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the
+particles.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from distfsi.device.emit import plain
+from distfsi.device.seam import Columns, Device, Pair
+from distfsi.errors import Diverged
+from distfsi.mesh.blocks import Blocks, Snapshot
+from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.kernels import particles as particle_kernels
+from distfsi.mesh.kernels import rows as row_kernels
+from distfsi.mesh.particles import ParticleExchange
+from distfsi.mesh.rows import Groups
+from distfsi.scene.description import Scene
+from distfsi.scene.packing import initial_velocity, pack
+from distfsi.scene.shapes import contains
+from distfsi.solid import neighbours, pieces, updated
+from distfsi.solid import total_lagrangian as bonds
+from distfsi.solid.formulas.strength import von_mises
+from distfsi.solid.kernels import material, motion
+from distfsi.solid.kernels import pairs as kernels
+from distfsi.solid.materials import Materials
+from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.total_lagrangian import TotalLagrangian
+from distfsi.solid.updated import UpdatedLagrangian
+
+DRIVERS = (
+    *particle_kernels.EXCHANGE,
+    *neighbours.DRIVERS,
+    *row_kernels.REDUCTIONS,
+    motion.collect_state,
+    motion.kick,
+    motion.push,
+    motion.average,
+    motion.move,
+    material.deform,
+    *updated.DRIVERS,
+    *bonds.DRIVERS,
+)
+SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
+LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
+
+
+class Solid:
+    """All particles of this rank. A step is prepare(), time_step(), advance(dt), push(impulse), migrate(); of these a
+    sub-step is the first three.
+
+    columns  this rank's particles on host and device, in any order: id, body, fixed (n,), position [m],
+             velocity [m/s] (n, D), mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the
+             materials remember (solid/materials.py): deviator (n, D(D+1)/2) [Pa], pressure [Pa], sound_speed [m/s],
+             damage (n,) … Velocities belong to half a step before the positions.
+    start    (own, D) [m] positions when the step began, on the device
+    before   (own, D) [m/s] velocities then, on the device
+    carried  (own, D) [m/s] mean velocity since then, on the device
+    sub_steps  that have been made since then
+    work     (local blocks,) work [J] of the last step's external impulse
+    given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
+    """
+
+    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
+        self.blocks, self.communicator, self.team = blocks, communicator, team
+        self.dimensions = scene.domain.dimensions
+        self.materials = Materials(scene.solid, self.dimensions)
+        self._tables = [team.array(table) for table in self.materials.tables]
+        axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
+        self._vector = tuple((a,) for a in axes)
+        self._components = self.dimensions * (self.dimensions + 1) // 2
+        constants = {
+            "DIMENSIONS": self.dimensions,
+            "COMPONENTS": self._components,
+            "GRAVITY": tuple(map(float, scene.gravity)),
+            "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
+            "VISCOSITY_BETA": scene.solid.viscosity_beta,
+            "SMOOTHING_RATIO": scene.solid.smoothing,
+            "ARTIFICIAL_STRESS": scene.solid.artificial_stress,
+            "ZERO_ENERGY": scene.solid.zero_energy,
+        } | self.materials.constants
+        self.kernels = team.build(DRIVERS, constants)
+        self._von_mises = plain(von_mises, constants)
+        self.exchange = ParticleExchange(blocks, team, self.kernels)
+        search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
+        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(
+            self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
+        )
+        if scene.solid.form == "total_lagrangian":
+            given = (communicator, scene.solid, *self._tables[:2], self.dimensions)
+            self.form = TotalLagrangian(self.kernels, self.exchange, search, *given)
+        self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
+        self._gravity_work = np.zeros(blocks.local_count)
+        self.work = np.zeros(blocks.local_count)
+        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
+        self._home: Pair | None = None
+        self.sub_steps = 0
+        self._own_particles(scene)
+
+    def _own_particles(self, scene: Scene) -> None:
+        """Pack the bodies and keep the particles of this rank's blocks."""
+        columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
+        columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
+        columns["id"] = np.arange(len(columns["body"]))
+        mine = self.blocks.owners[self.blocks.block_of(columns["position"])] == self.communicator.rank
+        c = {name: column[mine] for name, column in columns.items()}
+        c["energy"] = np.zeros(len(c["id"]))
+        self.columns = Columns(self.team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
+        self.migrate()
+        self._deform(0.0, self.team.zeros((len(c["id"]), self.dimensions**2)))
+        self.form.bind(self.columns, self.exchange)
+
+    def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
+        body = scene.solid.bodies[b]
+        position, volume = pack(body, scene.domain.lower, scene.domain.upper)
+        n = len(position)
+        fixed = np.zeros(n, dtype=bool) if body.fixed is None else contains(body.fixed, position)
+        return {
+            "body": np.full(n, b),
+            "position": position,
+            "velocity": np.where(fixed[:, None], body.fixed_velocity or 0.0, initial_velocity(body, position)),
+            "fixed": fixed,
+            "mass": body.density * volume,
+            "density": np.full(n, body.density),
+            "h": np.full(n, scene.solid.smoothing * body.spacing),
+        }
+
+    # ---- the step ---------------------------------------------------------------------------------------------------
+
+    def prepare(self, reach: float = 0.0, stray: float = 0.0, goes_on: bool = False) -> None:
+        """Collective. Bring in ghosts and images, find neighbours, and compute the forces between particles.
+
+        `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. `goes_on`: a step that
+        has begun goes on with another sub-step; `stray` [m]: how far particles go between two calls of migrate(), if
+        there are such. Raises Diverged on all ranks when a smoothing length is not finite.
+        """
+        c, device, own = self.columns, self.team, self.count
+        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
+        support, *flags = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
+        support *= 2.0
+        if not np.isfinite(support):
+            raise Diverged("solid: a smoothing length is not finite")
+        state, parity = device.empty((own, kernels.VELOCITY + self.dimensions)), ((),) * kernels.VELOCITY
+        device.run(self.kernels.collect_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
+        (here,) = c.read("position")
+        if not goes_on:
+            self.start, self.sub_steps = here, 0
+            self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
+            self._run(self.kernels.average, 1, *c.read("velocity"), self.before)
+        reach = max(reach, support)
+        plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.asked(c), image_reach=reach)
+        given = [(here, "position"), (state, parity + self._vector), *self.form.told(c)]
+        position, state, *told = plan.exchange(given)
+        self._near = Near(plan, position, state, support, told, flags)
+        self._acceleration = device.zeros((own, self.dimensions))
+        self._limits = device.empty((own, len(LIMITS)))
+        self.form.accelerate(c, self._near, self._acceleration, self._limits)
+
+    def time_step(self) -> tuple[float, str]:
+        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare(). Of
+        particles with the same step the first by block, body and id is named."""
+        if self.count == 0:
+            return np.inf, "solid"
+        rows = self.exchange.rows
+        dt, place = rows.least(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        particle, cause = divmod(place, len(LIMITS))
+        dt, id = float(dt), self.columns["id"][self._order[particle]]
+        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
+
+    def advance(self, dt: float) -> None:
+        """Collective, after prepare(). Advance by `dt` [s]: velocities first, then positions.
+
+        The energy takes the mean of old and new velocities: kinetic plus internal energy grow by the work of gravity.
+        """
+        self.kick(dt)
+        self.drift(dt)
+
+    def kick(self, dt: float) -> None:
+        """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
+        c, booked = self.columns, self.team.empty((self.count, 1 + self.dimensions))
+        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), booked)
+        self._run(self.kernels.kick, dt, *given)
+        books = self._per_body(booked).sum(axis=1)
+        self._gravity_work += books[:, motion.WORK]
+        self._boundary_impulse += books[:, motion.IMPULSE :]
+
+    def drift(self, dt: float) -> None:
+        """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
+        c, device, D = self.columns, self.team, self.dimensions
+        (velocity,) = c.read("velocity")
+        (around,) = self._near.plan.exchange([(velocity, self._vector)])
+        gradient = device.zeros((self.count, D**2))
+        self.form.strain(c, self._near, dt, around, gradient)
+        self._deform(dt, gradient)
+        moved = device.empty((self.count, D))
+        self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
+        c.adopt("position", moved)
+        self.sub_steps += 1
+        self._run(self.kernels.average, self.sub_steps, velocity, self.carried)
+
+    def push(self, impulse: Any) -> Any:
+        """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
+
+        Returns by how much (own, D) [m/s], another one, the velocity at which the impulse works on each particle, the
+        mean of before and after, exceeds the one that carried it.
+        """
+        c, device, D = self.columns, self.team, self.dimensions
+        excess, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
+        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, booked)
+        self._run(self.kernels.push, impulse, *given)
+        books = self._per_body(booked).sum(axis=1)
+        self.work, self.given = books[:, 0], self._per_body(impulse)
+        self._gravity_work += books[:, 1]
+        self._boundary_impulse += books[:, 2:]
+        return excess
+
+    def migrate(self) -> None:
+        """Collective. Give the particles that left this rank's blocks to their new owners."""
+        home = self.exchange.migrate(self.columns, self._home)
+        if home is self._home:
+            return
+        self._home, bodies = home, self.given.shape[1]
+        self._block = home.here() - self.blocks.first
+        group = self._block * bodies + self.columns["body"]
+        self._order = np.lexsort((self.columns["id"], group))
+        sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
+        self._groups = Groups(self.team, self.kernels, sizes, self._order)
+
+    def _sorted(self, *names: str) -> dict[str, np.ndarray]:
+        """The columns of these names by (block, body, id), an order that depends on nothing else."""
+        return {name: self.columns[name][self._order] for name in names}
+
+    def _deform(self, dt: float, gradient: Any) -> None:
+        c = self.columns
+        self._run(self.kernels.deform, dt, gradient, *c.read("body"), *self._tables, *self.materials.state(c))
+
+    def _run(self, kernel: Any, *arguments: Any) -> None:
+        self.team.run(kernel, self.count, *arguments)
+
+    # ---- totals and output ------------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """Number of this rank's particles."""
+        return self.columns.read("id")[0].shape[0]
+
+    def _per_body(self, values: Any) -> np.ndarray:
+        """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
+        return self._groups.sums(values).reshape(*self.given.shape[:2], values.shape[1])
+
+    @property
+    def around(self) -> Near:
+        """Own particles, ghosts and images as of prepare()."""
+        return self._near
+
+    def check(self, time: float) -> None:
+        """Raise Diverged, naming the particle, if one of this rank has no valid state at `time` [s]."""
+        c = self.columns
+        names = ("position", "velocity", "density", "energy", "sound_speed")
+        broken = np.flatnonzero(~np.isfinite(np.column_stack([c[name] for name in names])).all(axis=1))
+        if len(broken):
+            state = ", ".join(f"{name} {c[name][broken[0]]}" for name in names)
+            raise Diverged(f"solid particle {c['id'][broken[0]]} has no valid state at t = {time:.6g} s: {state}")
+
+    def totals(self) -> dict[str, np.ndarray]:
+        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks."""
+        c = self.columns
+        mass, velocity = c["mass"], c["velocity"]
+        kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
+        values = np.column_stack([mass, kinetic, mass * c["energy"], mass[:, None] * velocity])
+        total = self.blocks.sum(self._per_body(self.team.array(values)).sum(axis=1))
+        return {"mass": total[0], "kinetic": total[1], "internal": total[2], "momentum": total[3:]}
+
+    def body_totals(self, body: int) -> dict[str, np.ndarray]:
+        """Collective. mass [kg], center of mass (D,) [m], momentum (D,) [N s] of a body, and the impulse (D,) [N s]
+        that the fluid gave to it in the last step."""
+        c, D = self.columns, self.dimensions
+        mass = c["mass"][:, None]
+        values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
+        amounts = self._per_body(self.team.array(values))
+        total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
+        mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
+        return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
+
+    def pieces(self) -> dict[str, np.ndarray] | None:
+        """Collective. The pieces that intact bonds hold together: see solid/pieces.py; None without bonds."""
+        self.label_pieces()
+        if "piece" not in self.columns:
+            return None
+        c = self._sorted("piece", "mass", "position", "velocity")
+        return pieces.table(c, self._block[self._order], self.blocks)
+
+    def label_pieces(self) -> None:
+        """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
+        self.form.label_pieces(self.columns, self.exchange)
+
+    def boundary_impulse(self) -> np.ndarray:
+        """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
+        return self.blocks.sum(self._boundary_impulse)
+
+    def gravity_work(self) -> float:
+        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start."""
+        return self.blocks.sum(self._gravity_work[:, None])[0]
+
+    def workload(self) -> np.ndarray:
+        """(local blocks,) particles."""
+        return np.bincount(self._block, minlength=self.blocks.local_count).astype(float)
+
+    def snapshot(self) -> Snapshot:
+        """What a restart needs."""
+        sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
+        return {"particles": self._sorted(*self.columns), "sums": sums}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Collective. Go on from a snapshot, whose particles may be on any rank."""
+        for name, column in snapshot["particles"].items():
+            self.columns[name] = column
+        self._home = None
+        self.migrate()
+        self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
+        self._gravity_work[:] = snapshot["sums"]["gravity_work"]
+
+    def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,), and the stress (n, 6)
+        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all, by block, body and id."""
+        D, rows = self.dimensions, self._order if chosen is None else chosen
+        c = {name: column[rows] for name, column in self.columns.items()}
+        vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
+        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
+        names += [name for name in ("piece", "dust") if name in c]
+        invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
+        return vectors | {name: c[name] for name in names} | invariant
+
+    def _cauchy_stress(self, columns: dict[str, np.ndarray]) -> np.ndarray:
+        """(n, 6) stress [Pa], tension positive; the normal stresses out of the plane share what makes the deviator's
+        trace vanish."""
+        deviator, D = columns["deviator"], self.dimensions
+        stress = np.zeros((len(deviator), 6))
+        stress[:, :D] = deviator[:, :D]
+        stress[:, D:3] = -deviator[:, :D].sum(axis=1, keepdims=True) / max(3 - D, 1)
+        stress[:, :3] -= columns["pressure"][:, None]
+        for column, component in zip(SHEARS[D], deviator[:, D:].T, strict=True):
+            stress[:, column] = component
+        return stress
