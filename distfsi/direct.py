@@ -46,12 +46,12 @@ def arrives(communicator: Communicator, gpu: Gpu) -> bool:
     """Collective. Whether a message from each rank's GPU arrives at the next rank's as it was."""
     values = np.arange(VALUES, dtype=np.float64)
     outgoing, incoming = (gpu.message_memory(VALUES, values.dtype) for _ in range(2))
-    with gpu.beside():
-        gpu.put(outgoing, values + communicator.rank)
-    gpu.finish_beside()
+    with gpu.asynchronous():
+        gpu.upload(outgoing, values + communicator.rank)
+    gpu.finish_asynchronous()
     communicator.pass_on(outgoing, incoming)
     before = (communicator.rank - 1) % communicator.size
-    return all(communicator.allgather(np.array_equal(gpu.get(incoming), values + before)))
+    return all(communicator.allgather(np.array_equal(gpu.download(incoming), values + before)))
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.device.cuda import NoGpu, gpu_of
+from distfsi.device.interface import Device
 from distfsi.device.nvrtc import CompileError
-from distfsi.device.seam import Device
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.direct import arrives, refusal
 from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
@@ -88,9 +88,9 @@ def run(
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
             simulation.asked = requests.strongest
-            accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
-            records = Records(simulation, accounts, files, origin)
-            kept = simulation.kept() | {"accounts": accounts, "records": records}
+            budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
+            records = Records(simulation, budget, files, origin)
+            kept = simulation.kept() | {"budget": budget, "records": records}
             if origin:
                 origin.restore(kept, simulation.blocks, communicator)
             else:
@@ -101,13 +101,13 @@ def run(
                 break
             snapshots = {name: part.snapshot() for name, part in kept.items()}
             origin = Handover(simulation.time, simulation.steps, records.restart, snapshots)
-            del simulation, accounts, records, kept, snapshots  # before those of the new owners are built
+            del simulation, budget, records, kept, snapshots  # before those of the new owners are built
     done = (
         f"done: t = {simulation.time:.6g} s after {simulation.steps} steps in {clock.perf_counter() - started:.1f} s."
     )
     fluid = simulation.fluid
     rest = f" {100 * fluid.share_at_rest():.0f} % of the tile stages were at rest." if fluid else ""
-    progress.finish(f"{done} {accounts.summary(simulation)}{rest}")
+    progress.finish(f"{done} {budget.summary(simulation)}{rest}")
     picture = on_root(communicator, directory / "summary.png", lambda: draw_summary(directory))
     if communicator.rank == 0:
         print(f"results in {directory}, picture in {picture}", flush=True)

@@ -14,7 +14,7 @@ import psutil
 from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
 from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
 from distfsi.device.cpu import Team
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.diagnostics.gauges import Gauge, gauge_of
 from distfsi.diagnostics.peaks import Peaks, schlieren
 from distfsi.errors import Diverged, StepFailed
@@ -67,13 +67,13 @@ def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: Time
     """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
     solid.prepare(coupling.reach, coupling.stray)
     dt = sub_cycle(solid, coupling, *time_step())  # Eqs. 5-7
-    coupling.follow()
+    coupling.update_geometry()
     for stage in fluid.stages:
         coupling.before_stage(stage)
         fluid.advance_stage(stage, dt)
         coupling.after_stage(stage, dt)
-    excess = solid.push(coupling.impulse())  # Eq. 34
-    coupling.book_work(excess)
+    excess = solid.apply_impulse(coupling.transfer_impulse())  # Eq. 34
+    coupling.account_work(excess)
     solid.migrate()
     return dt
 

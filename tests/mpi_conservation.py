@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from distfsi.commands.bench_ranks import measure
 from distfsi.commands.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene.description import Performance, Scene
 from distfsi.simulation import Simulation
@@ -50,11 +50,11 @@ def main():
     install_abort_on_exception(communicator)
     for name in sys.argv[1:]:
         simulation = Simulation.of(box(name), communicator, threads=1)
-        accounts = Accounts(simulation.fluid, None, None)
-        accounts.row(simulation)
+        budget = Budget(simulation.fluid, None, None)
+        budget.row(simulation)
         while not simulation.done:
             simulation.step()
-        row, cells = accounts.row(simulation), cells_of(simulation)
+        row, cells = budget.row(simulation), cells_of(simulation)
         if communicator.rank == 0:
             drift = {key: value for key, value in row.items() if key.startswith("drift")}
             print(json.dumps({"name": name, "digest": hashlib.sha256(cells.tobytes()).hexdigest()} | drift), flush=True)

@@ -82,7 +82,7 @@ def result(name, device):
     simulation.step()
     fluid.restore(kept)
     again = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
-    return [*cells, *books, *again, peaks.here(), faults_of(communicator)]
+    return [*cells, *books, *again, peaks.host(), faults_of(communicator)]
 
 
 def solid_result(case, steps, device):
@@ -145,7 +145,7 @@ class Messenger:
         return self._watched(self._world.Irecv, *arguments)
 
     def _watched(self, message, values, rank):
-        self.too_early += not self._device.runtime.is_idle(Queue.BESIDE)
+        self.too_early += not self._device.runtime.is_idle(Queue.ASYNCHRONOUS)
         self.direct += isinstance(values, HostArray)
         self.staged += values.dtype != np.uint8 and not isinstance(values, HostArray)
         return message(values, rank)
@@ -245,7 +245,7 @@ def check_fatal():
     expected = case(Team(1))
     assert same(case(Gpu(HostRuntime())), expected)
     print("begun", flush=True)
-    assert not is_found(case, expected, without_order(Queue.BESIDE), False)
+    assert not is_found(case, expected, without_order(Queue.ASYNCHRONOUS), False)
 
 
 def without(name):
@@ -265,19 +265,19 @@ def without_order(queue):
 
 def without_wait_of_get(gpu):
     """The host looks at once."""
-    gpu._wait = lambda queue: gpu.runtime.synchronise(queue) if queue is Queue.BESIDE else None
+    gpu._wait = lambda queue: gpu.runtime.synchronise(queue) if queue is Queue.ASYNCHRONOUS else None
 
 
 MUTANTS = {
-    "the wait before messages": without("finish_beside"),
+    "the wait before messages": without("finish_asynchronous"),
     "the copy of what is sent": without("take"),
     "the copy of what came": without("put"),
     "the wait for the ghosts": without_order(Queue.MAIN),
-    "the wait for the cells": without_order(Queue.BESIDE),
+    "the wait for the cells": without_order(Queue.ASYNCHRONOUS),
     "the wait before looking": without_wait_of_get,
 }
 SOLID_MUTANTS = {
-    "the wait before messages": without("finish_beside"),
+    "the wait before messages": without("finish_asynchronous"),
     "the copy of what is sent": without("take"),
     "the copy of what came": without("put"),
     "the wait for the ghosts": without_order(Queue.MAIN),

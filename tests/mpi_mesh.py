@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.device.cpu import Team
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.errors import Diverged
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.chosen import ChosenGhosts
@@ -203,8 +203,8 @@ def check_own(blocks, everything, mine, home):
     block = expected_blocks(blocks, everything["position"])
     order = np.lexsort((everything["id"], block))
     order = order[blocks.owners[block[order]] == blocks.communicator.rank]
-    np.testing.assert_array_equal(np.sort(home.here()), block[order])
-    rows = np.lexsort((mine["id"], home.here()))
+    np.testing.assert_array_equal(np.sort(home.host()), block[order])
+    rows = np.lexsort((mine["id"], home.host()))
     for name, column in everything.items():
         assert mine[name].dtype == column.dtype
         np.testing.assert_array_equal(mine[name][rows], column[order], err_msg=name)
@@ -271,7 +271,7 @@ def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     ghosts = expected_ghosts(blocks, everything, reach, bonded)
     ids = np.concatenate([mine["id"], everything["id"][ghosts]])
     assert plan.own == len(mine["id"])
-    np.testing.assert_array_equal(plan.key.here[: len(ids)], 8 * ids)
+    np.testing.assert_array_equal(plan.key.host[: len(ids)], 8 * ids)
 
     row_of = {key: row for row, key in enumerate(everything["id"].tolist())}
     position = everything["position"]
@@ -279,11 +279,11 @@ def check_ghost_particles(blocks, everything, mine, plan, reach, bonded):
     near = (np.abs(position - planes) <= reach) @ (1 << np.arange(position.shape[1]))
     np.bitwise_or.at(near, [row_of[i] for i in (bonded // 8).tolist()], bonded % 8)
     images = [8 * i + mask for i in ids.tolist() for mask in range(1, 8) if mask & near[row_of[i]] == mask]
-    assert plan.count == len(plan.key.here)
-    assert sorted(plan.key.here[len(ids) :].tolist()) == sorted(images)
+    assert plan.count == len(plan.key.host)
+    assert sorted(plan.key.host[len(ids) :].tolist()) == sorted(images)
 
-    rows = np.array([row_of[i] for i in (plan.key.here // 8).tolist()], dtype=int)
-    flipped = plan.key.here[:, None] % 8 >> np.arange(position.shape[1]) & 1 == 1
+    rows = np.array([row_of[i] for i in (plan.key.host // 8).tolist()], dtype=int)
+    flipped = plan.key.host[:, None] % 8 >> np.arange(position.shape[1]) & 1 == 1
     check_values(everything, mine, plan, rows, flipped, planes[rows])
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import load
 from distfsi.simulation import Simulation
@@ -185,13 +185,13 @@ def cells_of(simulation):
 def follow(name):
     """Run a scene: per step the time step, at the end the cells and the row of the history; and the share at rest."""
     simulation = simulation_of(name)
-    accounts = Accounts(simulation.fluid, simulation.solid, simulation.coupling)
-    accounts.row(simulation)
+    budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
+    budget.row(simulation)
     steps = []
     while not simulation.done:
         simulation.step()
         steps.append(simulation.dt)
-    row = accounts.row(simulation)
+    row = budget.row(simulation)
     return {
         "time steps": np.array(steps),
         "cells": cells_of(simulation),

@@ -36,7 +36,7 @@ def test_a_stretched_ring_stays_closed(thickness, stretch):
     c["position"] *= np.sqrt(1.0 + grown / (c["position"] ** 2).sum(axis=1))[:, None]
     coupled.solid.migrate()
     coupled.solid.prepare(coupled.coupling.reach)
-    coupled.coupling.follow()
+    coupled.coupling.update_geometry()
     covered = coupled.covered[0]
     assert label(~covered)[1] == 2
     x = (np.arange(96) + 0.5) * 0.5 - 24.0

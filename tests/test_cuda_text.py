@@ -26,7 +26,7 @@ CUT_CELLS = (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images, push
 SCHEMES = {"paper": (coupling, push), "cut_cells": CUT_CELLS}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
-OF_OTHER_SCHEMES["stairs"] = {"evict", "put_moved", "cover_evicted"}  # no cell is small before it is shut
+OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_evicted"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
 ALWAYS |= {"find_neighbours", "push"}
 
@@ -95,7 +95,7 @@ def steps_side_by_side(monkeypatch, path, steps, overrides=()):
     simulation = Simulation.of(load(path, overrides), Communicator(), 1)
     for _ in range(steps):
         simulation.step()
-    simulation.coupling.sealed()
+    simulation.coupling.trapped()
     assert not pair.unlike
     return pair.calls
 

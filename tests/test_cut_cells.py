@@ -36,7 +36,7 @@ def rigid(shape, spacing, velocity):
 
 def volumes(case):
     """(z, y, x) of the whole grid."""
-    return case.grid_of(case.coupling.swept.here())[0]
+    return case.grid_of(case.coupling.swept.host())[0]
 
 
 def primitives(case):
@@ -92,7 +92,7 @@ def test_an_image_counts_where_its_body_reaches_the_end_of_the_domain(dimensions
         case.solid.columns["position"] = place + gap * (np.arange(D) == D - 1)
         case.coupling._particles.look(*case.solid.columns.read("position"))
         case.coupling._particles.cut(*case.solid.columns.read("position", "velocity"))
-        beneath = case.grid_of(case.coupling.wall.fractions[1].here())[0]
+        beneath = case.grid_of(case.coupling.wall.fractions[1].host())[0]
         opened.append(beneath[(0,) * (3 - D) + (0,) + (n // 2,) * (D - 1)])
     near = gaps < 0.31
     assert opened[0] == 0.0 and np.abs(np.diff(opened)[near[1:]]).max() < 0.2
@@ -152,7 +152,7 @@ def test_noise_of_the_particles_volumes_moves_the_wall_as_little(noise):
         density = case.solid.columns["density"]
         density *= 1.0 + share * rng.normal(size=len(density))
         case.step()
-        parts.append(case.grid_of(case.coupling.wall.fractions[1].here())[0])
+        parts.append(case.grid_of(case.coupling.wall.fractions[1].host())[0])
     change = (parts[1] - parts[0])[(parts[0] > 0.0) & (parts[0] < 1.0)]
     assert 0.0 < np.sqrt((change**2).mean()) < 0.8 * noise and np.abs(change).max() < 3.0 * noise
 
@@ -351,7 +351,7 @@ def test_stairs_keep_uniform_flow_and_all_books():
     for _ in range(15):
         carried.step()
         thrown.step()
-    W, parts = primitives(carried)[:, volumes(carried) > 0.0], thrown.coupling.wall.fractions[1].here()
+    W, parts = primitives(carried)[:, volumes(carried) > 0.0], thrown.coupling.wall.fractions[1].host()
     assert np.abs(W[3] - 1.0).max() < 1e-12 and np.abs(W[1:3] - np.array(u)[:, None]).max() < 1e-12
     assert np.isin(parts, (0.0, 1.0)).all() and (parts == 0.0).any()
     assert np.abs(thrown.balance() - before).max() < 1e-12 * before.max()
@@ -368,7 +368,7 @@ def positive(case):
 
 def low_side(case):
     """Mass on the low side of a plate and in what is shut in, and whether gas gets across."""
-    volume, aperture = volumes(case), case.grid_of(case.coupling.wall.apertures[1].here())
+    volume, aperture = volumes(case), case.grid_of(case.coupling.wall.apertures[1].host())
     index, edges = np.arange(volume.size).reshape(volume.shape), []
     for axis in range(case.fluid.model.dimensions):
         low, high = (np.delete(index, end, axis=2 - axis).ravel() for end in (-1, 0))
@@ -530,16 +530,16 @@ def test_a_pocket_that_is_covered_keeps_its_gas():
         content = (case.grid_of(case.fluid.state)[0] * volumes(case))[0, 0]
         return content[int(20 * case.solid.columns["position"].mean()) :].sum()
 
-    mass, covered, sealed = before_piston(), 0, []
+    mass, covered, trapped = before_piston(), 0, []
     while case.simulation.time < 1.5:
         case.step()
         if case.simulation.time > 0.7:
             case.solid.columns["velocity"][:] = -0.5
-        covered += case.grid_of(case.coupling.wall.fractions[1].here())[0, 0, 0, -1] == 0.0
-        sealed.append(20 * case.coupling.sealed()[0])
+        covered += case.grid_of(case.coupling.wall.fractions[1].host())[0, 0, 0, -1] == 0.0
+        trapped.append(20 * case.coupling.trapped()[0])
         assert positive(case)
         assert before_piston() == pytest.approx(mass, rel=1e-13)
-    assert covered > 5 and sealed[0] == sealed[-1] == 0.0 and max(sealed) == pytest.approx(mass, rel=1e-13)
+    assert covered > 5 and trapped[0] == trapped[-1] == 0.0 and max(trapped) == pytest.approx(mass, rel=1e-13)
 
 
 @pytest.mark.parametrize(("cfl", "flows"), [(0.5, True), (0.9, False)])
@@ -553,7 +553,7 @@ def test_gas_flows_through_a_gap_that_is_wide_enough_for_the_step(cfl, flows):
         case.step()
         assert positive(case)
     inside = (0, 0, slice(6, 14))
-    assert (case.grid_of(case.coupling.kind.here())[0][inside] == FLUID).all() == flows
+    assert (case.grid_of(case.coupling.kind.host())[0][inside] == FLUID).all() == flows
     if flows:
         u, v = primitives(case)[1:3]
         assert np.abs(u[inside]).max() > 0.1 and np.abs(v[inside]).max() < 0.01
@@ -574,7 +574,7 @@ def test_a_film_between_sliding_bodies_is_squeezed_out_and_comes_back():
         if case.simulation.time > 0.5:
             velocity = case.solid.columns["velocity"]
             velocity[velocity[:, 0] > 0.25, 1] = 0.1
-        shut_cells = max(shut_cells, (case.grid_of(case.coupling.kind.here()) == SHUT).sum())
+        shut_cells = max(shut_cells, (case.grid_of(case.coupling.kind.host()) == SHUT).sum())
         assert positive(case)
     assert shut_cells > 0
     assert abs(case.balance()[0] - before) < 1e-13
@@ -655,7 +655,7 @@ def test_a_cloud_of_debris_that_flies_apart_turns_to_dust(phases):
         assert W[: len(phases)].min() > 0.0 and W[len(phases) + 2].min() > 0.0
     assert gone[0] < gone[-1] == len(places) and (np.diff(gone) >= 0).all()
     assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
-    assert (case.grid_of(case.coupling.wall.fractions[1].here()) == 1.0).all()
+    assert (case.grid_of(case.coupling.wall.fractions[1].host()) == 1.0).all()
 
 
 def test_gas_fills_the_room_of_a_wall_that_turns_to_dust_at_once():

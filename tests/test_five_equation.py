@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.scene.description import Box, FluidState, Region
 from fluids import AIR, TNT, WATER
 from test_tubes import PRODUCTS_AIR, STIFF, TUBES
@@ -51,13 +51,13 @@ def test_interface_stays_in_balance(eos, speed):
         Region(FluidState(0, 1000.0 if eos[0] is WATER else 1.0, 1e5, (speed,)), Box((0.3,), (0.7,))),
     )
     simulation = start(scene_of(eos, regions, (0.0,), (1.0,), (100,), 1e-3, (PERIODIC,), **METHOD))
-    accounts = Accounts(simulation.fluid, None, None)
-    accounts.row(simulation)
+    budget = Budget(simulation.fluid, None, None)
+    budget.row(simulation)
     found = fields(advance(simulation))
     assert np.abs(found["velocity"][..., 0] - speed).max() <= 1e-10 * max(speed, 1.0)
     stiff = 4.4 * 6e8 if eos[0] is WATER else 1e5
     assert np.abs(found["pressure"] - 1e5).max() <= 1e-12 * max(1000.0 * speed**2, stiff) * np.sqrt(simulation.steps)
-    row = accounts.row(simulation)
+    row = budget.row(simulation)
     assert max(abs(row[name]) for name in row if name.startswith("drift")) < 1e-12
 
 

@@ -25,7 +25,7 @@ LAYERS = (
     {"errors", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
-ACROSS = {"mesh": "distfsi.device.seam"}
+ACROSS = {"mesh": "distfsi.device.interface"}
 
 # Inside a folder, at any depth, formulas know formulas and laws only, and kernels these, kernels and their markers.
 FORMULAS = ("formulas", "laws")

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from distfsi.device import cpu
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.scene import description as d
 from distfsi.solid.formulas import concrete, damage, strength
 from distfsi.solid.kernels.material import deform

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.scene.description import Box, FluidState, IdealGas, Performance, Region
 from fluids import AIR, WATER, model_of
 from tubes import OPEN, advance, fields, scene_of, start
@@ -101,9 +101,9 @@ def test_limited_flow_keeps_the_books_and_has_the_same_bits_on_any_cut():
     results = []
     for block, tile in (((40, 40), (40, 40)), ((17, 12), (5, 4))):
         simulation = falling_in(2, 40, 0.9, 0.1, performance=Performance(block, tile))
-        accounts = Accounts(simulation.fluid, None, None)
-        accounts.row(simulation)
-        row = accounts.row(advance(simulation))
+        budget = Budget(simulation.fluid, None, None)
+        budget.row(simulation)
+        row = budget.row(advance(simulation))
         assert max(abs(row[name]) for name in row if name.startswith("drift")) < 1e-13
         assert row["limited faces"] > 1000
         results.append((fields(simulation), row["limited faces"], simulation.steps))
@@ -130,12 +130,12 @@ def test_the_cell_that_limits_the_time_step_is_named(block):
 def test_a_failed_step_is_redone():
     """With half the time step, counted, and without a trace of the first attempt in the books."""
     simulation = torn_apart(100.0, 0.9, WALLS)
-    accounts = Accounts(simulation.fluid, None, None)
-    accounts.row(simulation)
+    budget = Budget(simulation.fluid, None, None)
+    budget.row(simulation)
     while not simulation.fluid.rejected_steps:
         simulation.step()
     assert simulation.limited_by == "rejected step"
-    row = accounts.row(simulation)
+    row = budget.row(simulation)
     assert row["rejected steps"] > 0
     assert max(abs(row[name]) for name in row if name.startswith("drift")) < 1e-13
 

@@ -21,7 +21,7 @@ import numpy as np
 from distfsi import __version__
 from distfsi.commands.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLID_SIZES, SOLIDS
 from distfsi.device.cpu import cache_directory
-from distfsi.diagnostics.budget import Accounts
+from distfsi.diagnostics.budget import Budget
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import Scene
@@ -30,7 +30,7 @@ from distfsi.simulation import Simulation, threads_of_rank
 REPEATS = 5
 RIPPLE = 1e-4  # relative
 SHEAR_RATE = 10.0  # 1/s
-CALLS_OF_COUPLING = ("time_step", "follow", "before_stage", "after_stage", "impulse", "book_work")
+CALLS_OF_COUPLING = ("time_step", "update_geometry", "before_stage", "after_stage", "transfer_impulse", "account_work")
 
 Result = dict[str, float]
 
@@ -73,10 +73,10 @@ def time_loop(simulation: Simulation, seconds: float) -> tuple[float, float]:
 
 def time_history(simulation: Simulation) -> float:
     """Best time [s] of one row of the history."""
-    accounts, best = Accounts(simulation.fluid, simulation.solid, simulation.coupling), np.inf
+    budget, best = Budget(simulation.fluid, simulation.solid, simulation.coupling), np.inf
     for _ in range(REPEATS):
         started = clock.perf_counter()
-        accounts.row(simulation)
+        budget.row(simulation)
         best = min(best, clock.perf_counter() - started)
     return best
 

@@ -77,7 +77,7 @@ class _Compiled:
 
 
 class Team:
-    """Threads of one rank that share the items of a driver call: the CPU as a device (device/seam.py).
+    """Threads of one rank that share the items of a driver call: the CPU as a device (device/interface.py).
 
     seconds: how long the calls have taken so far
     """
@@ -123,26 +123,26 @@ class Team:
     def message_memory(self, count: int, dtype: np.dtype) -> np.ndarray:
         return np.empty(count, dtype)
 
-    def beneath(self, message: np.ndarray) -> np.ndarray:
+    def staging_array(self, message: np.ndarray) -> np.ndarray:
         return message
 
-    def get(self, there: np.ndarray) -> np.ndarray:
-        return there
+    def download(self, array: np.ndarray) -> np.ndarray:
+        return array
 
-    def put(self, there: np.ndarray, host: np.ndarray) -> None:
-        if there is not host:
-            there[...] = host
+    def upload(self, array: np.ndarray, host: np.ndarray) -> None:
+        if array is not host:
+            array[...] = host
 
-    def take(self, message: np.ndarray, there: np.ndarray) -> None:
-        self.put(message, there)
+    def download_to(self, message: np.ndarray, array: np.ndarray) -> None:
+        self.upload(message, array)
 
-    def beside(self) -> nullcontext:
+    def asynchronous(self) -> nullcontext:
         return nullcontext()
 
-    def join(self) -> None:
+    def join_asynchronous(self) -> None:
         pass
 
-    def finish_beside(self) -> None:
+    def finish_asynchronous(self) -> None:
         pass
 
     def _share(self, function: Callable, count: int, *arguments) -> None:

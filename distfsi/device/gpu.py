@@ -1,4 +1,5 @@
-"""A GPU as a device (device/seam.py), whatever holds its memory and runs its kernels: CUDA, or the host in tests."""
+"""A GPU as a device (device/interface.py), whatever holds its memory and runs its kernels: CUDA, or the host in
+tests."""
 
 from __future__ import annotations
 
@@ -20,10 +21,10 @@ MOST_THREADS = 256
 
 
 class Queue(Enum):
-    """Where what is asked for waits its turn."""
+    """Where what is asked for waits its turn: a stream of the GPU."""
 
     MAIN = 0
-    BESIDE = 1
+    ASYNCHRONOUS = 1
 
 
 class Runtime(Protocol):
@@ -44,10 +45,10 @@ class Runtime(Protocol):
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         """Memory of the host that copies need not go around."""
 
-    def upload(self, there: Any, host: np.ndarray, queue: Queue) -> None:
+    def upload(self, array: Any, host: np.ndarray, queue: Queue) -> None:
         """Copy from the host."""
 
-    def download(self, host: np.ndarray, there: Any, queue: Queue) -> None:
+    def download(self, host: np.ndarray, array: Any, queue: Queue) -> None:
         """Copy to the host."""
 
     def order(self, first: Queue, then: Queue) -> None:
@@ -101,9 +102,9 @@ class Gpu:
     run_few = run
 
     def array(self, host: np.ndarray) -> Any:
-        there = self.runtime.empty(host.shape, host.dtype)
-        self.runtime.upload(there, host.copy(), self._queue)
-        return there
+        array = self.runtime.empty(host.shape, host.dtype)
+        self.runtime.upload(array, host.copy(), self._queue)
+        return array
 
     def empty(self, shape: tuple[int, ...] | int, dtype: type = np.float64) -> Any:
         return self.runtime.empty(_lengths(shape), np.dtype(dtype))
@@ -114,35 +115,35 @@ class Gpu:
     def message_memory(self, count: int, dtype: np.dtype) -> Any:
         return self.runtime.empty((count,), np.dtype(dtype)) if self.direct else self.runtime.pinned(count, dtype)
 
-    def beneath(self, message: Any) -> Any:
+    def staging_array(self, message: Any) -> Any:
         return message if self.direct else self.runtime.empty(message.shape, message.dtype)
 
-    def get(self, there: Any) -> np.ndarray:
-        host = np.empty(there.shape, there.dtype)
-        self.runtime.download(host, there, self._queue)
+    def download(self, array: Any) -> np.ndarray:
+        host = np.empty(array.shape, array.dtype)
+        self.runtime.download(host, array, self._queue)
         self._wait(self._queue)
         return host
 
-    def put(self, there: Any, host: Any) -> None:
-        if there is not host:
-            self.runtime.upload(there, host, self._queue)
+    def upload(self, array: Any, host: Any) -> None:
+        if array is not host:
+            self.runtime.upload(array, host, self._queue)
 
-    def take(self, message: Any, there: Any) -> None:
-        if there is not message:
-            self.runtime.download(message, there, self._queue)
+    def download_to(self, message: Any, array: Any) -> None:
+        if array is not message:
+            self.runtime.download(message, array, self._queue)
 
     @contextmanager
-    def beside(self) -> Iterator[None]:
-        self.runtime.order(Queue.MAIN, Queue.BESIDE)
-        self._queue = Queue.BESIDE
+    def asynchronous(self) -> Iterator[None]:
+        self.runtime.order(Queue.MAIN, Queue.ASYNCHRONOUS)
+        self._queue = Queue.ASYNCHRONOUS
         yield
         self._queue = Queue.MAIN
 
-    def join(self) -> None:
-        self.runtime.order(Queue.BESIDE, Queue.MAIN)
+    def join_asynchronous(self) -> None:
+        self.runtime.order(Queue.ASYNCHRONOUS, Queue.MAIN)
 
-    def finish_beside(self) -> None:
-        self._wait(Queue.BESIDE)
+    def finish_asynchronous(self) -> None:
+        self._wait(Queue.ASYNCHRONOUS)
 
     def _wait(self, queue: Queue) -> None:
         """The host waits while the kernels run: that is the time they take, as far as it shows."""

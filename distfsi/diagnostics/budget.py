@@ -10,7 +10,7 @@ from distfsi.mesh.blocks import Snapshot
 AXES = "xyz"
 
 
-class Accounts:
+class Budget:
     """Closes the books of a run: fluid + solid + left through boundaries - made by the coupling = constant.
 
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
@@ -41,7 +41,7 @@ class Accounts:
             ]
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
-            self.columns += [f"sealed {name}" for name in self.conserved[: self.phases]]
+            self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
             self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
@@ -84,7 +84,7 @@ class Accounts:
         if self.coupling:
             parts = self.solid.sub_steps
             values |= {"sub-steps": parts, "sub-steps limited by": simulation.name_solid_limit() if parts > 1 else ""}
-            values |= {f"sealed {n}": m for n, m in zip(self.conserved, self.coupling.sealed(), strict=False)}
+            values |= {f"trapped {n}": m for n, m in zip(self.conserved, self.coupling.trapped(), strict=False)}
             for cause, amounts in self.coupling.ledger().items():
                 book(f"ledger {cause}", amounts, -1.0)
         if np.isnan(self._start).all():

@@ -7,7 +7,7 @@ from math import prod
 import numpy as np
 
 from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
-from distfsi.device.seam import Pair
+from distfsi.device.interface import DualArray
 from distfsi.diagnostics.kernels import peaks as kernels
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Snapshot
@@ -33,12 +33,12 @@ class Peaks:
     def __init__(self, peaks: description.Peaks, fluid: Fluid, coupling: Coupling | None):
         self.peaks, self.fluid, self.coupling = peaks, fluid, coupling
         model, blocks = fluid.model, fluid.blocks
-        real = fluid.there.dtype.name
+        real = fluid.device_state.dtype.name
         self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
         fields = blocks.allocate(len(NAMES))
         fields[:, kernels.ARRIVAL] = np.inf
-        self.fields = Pair(fluid.team, fields)
-        self._kind = coupling.kind if coupling else Pair(fluid.team, blocks.allocate(1, np.uint8))
+        self.fields = DualArray(fluid.team, fields)
+        self._kind = coupling.kind if coupling else DualArray(fluid.team, blocks.allocate(1, np.uint8))
         self._shape, self._extent = fluid.team.array(np.array(blocks.shape)), fluid.team.array(blocks.extent)
         self._layers = blocks.grid.ghost_layers
         self._rows = blocks.local_count * prod(blocks.shape[:2])
@@ -46,16 +46,16 @@ class Peaks:
     def after_step(self, simulation) -> None:
         """Take in the step just made; before the first one the state at the start."""
         fluid, peaks = self.fluid, self.peaks
-        before = fluid.previous if simulation.steps else fluid.there
+        before = fluid.previous if simulation.steps else fluid.device_state
         fluid.team.run(
-            self.kernels.remember_peaks, self._rows, self._layers, fluid.there, before, self.fields.there,
+            self.kernels.remember_peaks, self._rows, self._layers, fluid.device_state, before, self.fields.device,
             self._kind.read, self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure,
             simulation.time, simulation.dt,
         )  # fmt: skip
 
     def outputs(self, covered: np.ndarray | None) -> dict[str, np.ndarray]:
         """Fields for the output files: (local blocks, bz, by, bx), NaN where covered or, for the arrival, too early."""
-        fields = self.fields.here()
+        fields = self.fields.host()
         return {
             name: padded(self.fluid, np.where(np.isinf(fields[:, v]), np.nan, fields[:, v]), covered)
             for v, name in NAMES.items()
@@ -63,11 +63,11 @@ class Peaks:
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
-        return {"cells": {"fields": self.fluid.blocks.without_ghosts(self.fields.here())}}
+        return {"cells": {"fields": self.fluid.blocks.without_ghosts(self.fields.host())}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.fluid.blocks.without_ghosts(self.fields.here())[:] = snapshot["cells"]["fields"]
+        self.fluid.blocks.without_ghosts(self.fields.host())[:] = snapshot["cells"]["fields"]
         self.fields.changed()
 
 

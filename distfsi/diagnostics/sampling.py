@@ -58,7 +58,7 @@ class FluidSampler:
     def values(self) -> np.ndarray:
         """Collective. The values (n, columns) at the points, on every rank."""
         D, P, fluid = self.fluid.model.dimensions, self.fluid.model.phases, self.fluid
-        covered = self.coupling.kind.here()[self._place] >= COVERED if self.coupling else np.zeros((len(self._own), 1))
+        covered = self.coupling.kind.host()[self._place] >= COVERED if self.coupling else np.zeros((len(self._own), 1))
         rows = np.hstack([self._own[:, None], fluid.state[self._place], covered], dtype=np.float64)
         rows = fluid.blocks.communicator.concatenate(rows)
         rows = rows[np.argsort(rows[:, 0])]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Device, Pair
+from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels import stage as kernels
@@ -58,13 +58,13 @@ class Fluid:
         for buffer in buffers:
             buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
-        self._buffers = [Pair(team, buffer) for buffer in buffers]
+        self._buffers = [DualArray(team, buffer) for buffer in buffers]
         self._lay_tiles(team.tile_cells(scene.performance.tile_cells))
         self._extent = team.array(blocks.extent)
-        self._fastest = Pair(team, np.zeros(blocks.local_count))
+        self._fastest = DualArray(team, np.zeros(blocks.local_count))
         self._before = self._booked()
         self._signal: float | None = None
-        self.volumes = Pair(team, np.ones((1, 1, 1, 1, 1), real))
+        self.volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
@@ -95,8 +95,8 @@ class Fluid:
         self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
         self._table = self.team.array(self.tiles)
-        self._through = Pair(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
-        self._limited = Pair(self.team, np.zeros(len(self.tiles), dtype=np.int64))
+        self._through = DualArray(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
+        self._limited = DualArray(self.team, np.zeros(len(self.tiles), dtype=np.int64))
         self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
 
     def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
@@ -112,12 +112,12 @@ class Fluid:
 
     @property
     def state(self) -> np.ndarray:
-        return self._buffers[0].here()
+        return self._buffers[0].host()
 
     @property
-    def there(self) -> Any:
+    def device_state(self) -> Any:
         """The state at the present time on the device."""
-        return self._buffers[0].there
+        return self._buffers[0].device
 
     def changed(self) -> None:
         """The state on the host has been changed."""
@@ -130,11 +130,11 @@ class Fluid:
 
     def input_of(self, stage: Stage) -> Any:
         """The state that a stage starts from, on the device."""
-        return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].there
+        return self._buffers[0 if stage.number == 0 else _output(stage.number - 1)].device
 
     def output_of(self, stage: Stage) -> Any:
         """Where a stage leaves its state; asked before the stage."""
-        return self._buffers[_output(stage.number)].there
+        return self._buffers[_output(stage.number)].device
 
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
@@ -145,7 +145,7 @@ class Fluid:
         """Go back to the state before the last step."""
         self._buffers[:2] = self._buffers[1::-1]
         for pair, before in zip((self._through, self._limited), self._before, strict=True):
-            pair.here()[:] = before
+            pair.host()[:] = before
             pair.changed()
         self.rejected_steps += 1
         self._signal = None
@@ -158,7 +158,7 @@ class Fluid:
 
     def _booked(self) -> tuple[np.ndarray, np.ndarray]:
         """Copies of what has left through the domain's sides, and of the number of limited faces."""
-        return self._through.here().copy(), self._limited.here().copy()
+        return self._through.host().copy(), self._limited.host().copy()
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
@@ -173,7 +173,7 @@ class Fluid:
         self.advance_tiles(self._ready_tiles, stage, dt)
         self.exchange.finish()
         self.advance_tiles(self._waiting_tiles, stage, dt)
-        self.rest.stages = self.team.get(self._stages)
+        self.rest.stages = self.team.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
             new = self._buffers.pop(_output(stage.number))
@@ -186,8 +186,8 @@ class Fluid:
         real = output.dtype.type
         self.team.run(
             self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
-            self._buffers[0].there, self.input_of(stage), output.there, self.volumes.there, self._through.there,
-            self._limited.there, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
+            self._buffers[0].device, self.input_of(stage), output.device, self.volumes.device, self._through.device,
+            self._limited.device, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
         )  # fmt: skip
 
     def rates(self, dt: float) -> list:
@@ -212,15 +212,15 @@ class Fluid:
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiles[~self.rest.settled, kernels.BLOCK])
         self.team.run(
-            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].there,
-            self._first_active(), self._extent, *inverse, self._fastest.there,
+            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].device,
+            self._first_active(), self._extent, *inverse, self._fastest.device,
         )  # fmt: skip
-        return float(np.max(self._fastest.here()))
+        return float(np.max(self._fastest.host()))
 
     @property
     def signals(self) -> np.ndarray:
         """(local blocks,) the last fastest signal [1/s] of each block."""
-        return self._fastest.here()
+        return self._fastest.host()
 
     def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple, str]:
         """The fastest of `signals`, those of this rank's blocks before the last step, where its block begins in the
@@ -228,7 +228,7 @@ class Fluid:
         if not self.blocks.local_count:
             return 0.0, (), ""
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
-        before = self.team.get(self.previous[block : block + 1])[(0, *self._inside(block))]
+        before = self.team.download(self.previous[block : block + 1])[(0, *self._inside(block))]
         with np.errstate(all="ignore"):
             W = self.model.formula("primitives")(before.astype(np.float64))
             c = self.model.formula("sound_speed")(W)
@@ -261,8 +261,8 @@ class Fluid:
         return {
             "cells": {"state": self.blocks.without_ghosts(self.state)},
             "sums": {
-                "through": self._through.here(),
-                "limited": self._limited.here().astype(np.float64),
+                "through": self._through.host(),
+                "limited": self._limited.host().astype(np.float64),
                 "rested": self.rest.counts[None],
             },
             "values": {"rejected_steps": np.array(self.rejected_steps)},
@@ -271,8 +271,8 @@ class Fluid:
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
-        self._through.here()[:] = snapshot["sums"]["through"]
-        self._limited.here()[:] = snapshot["sums"]["limited"]
+        self._through.host()[:] = snapshot["sums"]["through"]
+        self._limited.host()[:] = snapshot["sums"]["limited"]
         for pair in (self._buffers[0], self._through, self._limited):
             pair.changed()
         self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
@@ -291,7 +291,7 @@ class Fluid:
     def limited_faces(self) -> int:
         """Collective. How many faces had their flux limited so far, over all stages; those at the high sides of the
         domain are not counted."""
-        return int(self.blocks.communicator.concatenate(self._limited.here()).sum())
+        return int(self.blocks.communicator.concatenate(self._limited.host()).sum())
 
     def share_at_rest(self) -> float:
         """Collective. The part of all tile stages in which the tile was at rest."""
@@ -321,12 +321,12 @@ class Fluid:
     def leave(self, volume: np.ndarray) -> None:
         """Book all that the cells hold in this `volume` (local blocks, Z, Y, X) as having left the domain."""
         _, first = np.unique(self.tiles[:, kernels.BLOCK], return_index=True)
-        self._through.here()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
+        self._through.host()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
         self._through.changed()
 
     def left_domain(self) -> np.ndarray:
         """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""
-        through = self._through.here()
+        through = self._through.host()
         signed = through[:, 1::2].sum(axis=1) - through[:, 0::2].sum(axis=1)
         sums = np.zeros((self.blocks.local_count, self.model.conserved))
         np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)

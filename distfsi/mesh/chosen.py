@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.regions import Regions
 from distfsi.mesh.route import Route
@@ -60,7 +60,7 @@ class ChosenGhosts:
         for choice in (self._local, self._into, self._out):
             choice.choose(mark)
         givers, takers = (
-            ranks[self._device.get(choice.rows)]
+            ranks[self._device.download(choice.rows)]
             for ranks, choice in ((self._givers, self._into), (self._takers, self._out))
         )
         self._route = Route(self._communicator, takers, givers)
@@ -95,10 +95,10 @@ class ChosenGhosts:
         """The rows of the ghosts, packed, on the device."""
         device, route = self._device, self._route
 
-        def pack(there: Any) -> None:
+        def pack(packed: Any) -> None:
             column = 0
             for flat, parity in given:
-                place = (*self._out.columns, parity, self._cells, flat, stride, column, there)
+                place = (*self._out.columns, parity, self._cells, flat, stride, column, packed)
                 device.run(self._kernels.pack_cells, route.leaving, *place)
                 column += parity.shape[0]
 

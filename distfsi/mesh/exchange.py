@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.regions import Regions
 
@@ -34,7 +34,7 @@ class Messages:
         """A buffer for all messages about a field of so many variables."""
         values = device.message_memory(int(self.cells[-1]) * variables, dtype)
         parts = [values[a:b] for a, b in pairwise((self.cells * variables).tolist())]
-        return Buffer(values, device.beneath(values), list(zip(self.ranks.tolist(), parts, strict=True)))
+        return Buffer(values, device.staging_array(values), list(zip(self.ranks.tolist(), parts, strict=True)))
 
 
 @dataclass
@@ -42,7 +42,7 @@ class Buffer:
     """The flat `values` of all messages where MPI takes them and on the device, and the part that is each rank's."""
 
     values: Any
-    there: Any
+    device: Any
     parts: list[tuple[int, Any]]
 
 
@@ -51,7 +51,7 @@ class Table:
     """Regions to copy, on the device, and how many there are."""
 
     count: int
-    there: Any
+    device: Any
 
 
 @dataclass
@@ -99,10 +99,10 @@ class GhostExchange:
         """
         plan, device = self._plan(field.shape[1], field.dtype), self.device
         flat, mirror = field.reshape(-1), device.array(mirror)
-        with device.beside():
-            self._run(plan.pack, plan.outgoing.there, flat, mirror)
-            device.take(plan.outgoing.values, plan.outgoing.there)
-        device.finish_beside()  # and the last exchange has read what it received
+        with device.asynchronous():
+            self._run(plan.pack, plan.outgoing.device, flat, mirror)
+            device.download_to(plan.outgoing.values, plan.outgoing.device)
+        device.finish_asynchronous()  # and the last exchange has read what it received
         self._requests = [self._world.Irecv(part, rank) for rank, part in plan.incoming.parts]
         self._requests += [self._world.Isend(part, rank) for rank, part in plan.outgoing.parts]
         self._run(plan.local, flat, flat, mirror)
@@ -115,10 +115,10 @@ class GhostExchange:
         """Wait for the messages and fill the remaining ghosts."""
         plan, flat, mirror = self._unpack
         MPI.Request.Waitall(self._requests)
-        with self.device.beside():
-            self.device.put(plan.incoming.there, plan.incoming.values)
-            self._run(plan.unpack, flat, plan.incoming.there, mirror)
-        self.device.join()
+        with self.device.asynchronous():
+            self.device.upload(plan.incoming.device, plan.incoming.values)
+            self._run(plan.unpack, flat, plan.incoming.device, mirror)
+        self.device.join_asynchronous()
 
     def traffic(self, field: np.ndarray) -> tuple[int, int]:
         """Bytes and messages that this rank sends in one exchange of `field`."""
@@ -126,7 +126,7 @@ class GhostExchange:
         return outgoing.values.shape[0] * outgoing.values.dtype.itemsize, len(outgoing.parts)
 
     def _run(self, table: Table, destination: Any, source: Any, mirror: Any) -> None:
-        self.device.run_few(self._copy, table.count, table.there, destination, source, mirror)
+        self.device.run_few(self._copy, table.count, table.device, destination, source, mirror)
 
     def _plan(self, variables: int, dtype: np.dtype) -> Plan:
         plan = self._plans.get((variables, dtype))

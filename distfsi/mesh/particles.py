@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Columns, Device, Pair
+from distfsi.device.interface import Columns, Device, DualArray
 from distfsi.errors import InputError
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.kernels.particles import IMAGES
@@ -38,7 +38,7 @@ class ParticleExchange:
         self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.staged: Any = None  # memory that the last exchange may still read
 
-    def migrate(self, columns: Columns, block: Pair | None = None) -> Pair:
+    def migrate(self, columns: Columns, block: DualArray | None = None) -> DualArray:
         """Collective. All particles to the ranks that own their blocks.
 
         Rows are sorted by (block, id) where particles have come or gone; where they only changed blocks of this rank,
@@ -51,35 +51,35 @@ class ParticleExchange:
         communicator, device = self.blocks.communicator, self.device
         (position,) = columns.read("position")
         count, unsorted = position.shape[0], block is None
-        block = Pair(device, np.full(count, -1)) if block is None else block
+        block = DualArray(device, np.full(count, -1)) if block is None else block
         moved = self._some_moved(position, block)
-        now = block.here() if moved else np.empty(0, dtype=np.int64)
+        now = block.host() if moved else np.empty(0, dtype=np.int64)
         owner = self.blocks.owners[now]
         leaving = np.flatnonzero(owner != communicator.rank)
         leaving = leaving[np.argsort(owner[leaving], kind="stable")]
         route = Route(communicator, owner[leaving])
         if not moved and not route.arriving:
             return block
-        now, there = block.here(), device.array(leaving)
+        now, rows = block.host(), device.array(leaving)
         if not (unsorted or len(leaving) or route.arriving):
-            return Pair(device, now)
-        arrived = route.brought({name: device.get(self.rows.taken(*columns.read(name), there)) for name in columns})
+            return DualArray(device, now)
+        arrived = route.brought({name: device.download(self.rows.taken(*columns.read(name), rows)) for name in columns})
         stays = np.flatnonzero(self.blocks.owners[now] == communicator.rank)
         home = np.concatenate([now[stays], self.blocks.block_of(arrived["position"])])
         order = np.lexsort((np.concatenate([columns["id"][stays], arrived["id"]]), home))
         rows = np.concatenate([stays, count + np.arange(len(arrived))])[order]
         if not np.array_equal(rows, np.arange(count)):
-            there = device.array(rows)
+            kept = device.array(rows)
             for name in columns:
                 others = device.array(np.ascontiguousarray(arrived[name]))
-                columns.adopt(name, self.rows.taken(*columns.read(name), there, others))
-        return Pair(device, home[order])
+                columns.adopt(name, self.rows.taken(*columns.read(name), kept, others))
+        return DualArray(device, home[order])
 
-    def _some_moved(self, position: Any, block: Pair) -> bool:
+    def _some_moved(self, position: Any, block: DualArray) -> bool:
         """Whether particles are in other blocks than `block` says; then it says which."""
         moved = self.device.empty(chunks(position.shape[0]), np.int64)
-        self.rows.reduce(self.kernels.find_moved, position.shape[0], position, block.there, *self._grid, moved)
-        return bool(self.device.get(moved).any())
+        self.rows.reduce(self.kernels.find_moved, position.shape[0], position, block.device, *self._grid, moved)
+        return bool(self.device.download(moved).any())
 
     def ghosts(
         self,
@@ -104,7 +104,7 @@ class ParticleExchange:
         planes = self.planes(image_reach, mirrors)
         border, asked = self._border(position, reach, image_reach, planes), self._bonded(id, bonded)
         chosen = np.unique(np.concatenate([border, *asked.values(), self._with_images(id, bonded)]))
-        near = device.get(self.rows.taken(position, device.array(chosen)))
+        near = device.download(self.rows.taken(position, device.array(chosen)))
         pairs = [rank * own + rows for rank, rows in asked.items()] + self._near(near, chosen, own, reach)
         ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
@@ -115,7 +115,7 @@ class ParticleExchange:
         source, mask = images(mask)
         key = self._known_key(id, np.concatenate([arrived["id"] * IMAGES, known[source] * IMAGES + mask]))
         return GhostPlan(
-            own, len(key.here), key, self, route, device.array(rows), Images(device, place[source], mask, plane[source])
+            own, len(key.host), key, self, route, device.array(rows), Images(device, place[source], mask, plane[source])
         )
 
     def _border(self, position: Any, reach: float, image_reach: float, planes: list[tuple[int, float]]) -> np.ndarray:
@@ -129,7 +129,7 @@ class ParticleExchange:
             self.kernels.find_border, position.shape[0], position, reach, image_reach, self.device.array(axes),
             self.device.array(places), *self._grid, self._owners, communicator.rank, mark,
         )  # fmt: skip
-        return self.device.get(self.rows.marked(mark)[1])
+        return self.device.download(self.rows.marked(mark)[1])
 
     def _mirrored(
         self,
@@ -161,7 +161,7 @@ class ParticleExchange:
     def _known_key(self, id: np.ndarray, others: np.ndarray) -> Key:
         """The keys of the own particles and the others: the same object as last time if they are the same."""
         last = self._key
-        if last is None or last.id is not id or not np.array_equal(last.here[len(id) :], others):
+        if last is None or last.id is not id or not np.array_equal(last.host[len(id) :], others):
             self._key = Key(self.device, id, np.concatenate([id * IMAGES, others]))
         return self._key
 
@@ -228,10 +228,10 @@ def images(near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Key:
-    """Keys (count,) int64 of particles, ghosts and images on the host (`here`) and on the device (`there`)."""
+    """Keys (count,) int64 of particles, ghosts and images, on the `host` and on the `device`."""
 
-    def __init__(self, device: Device, id: np.ndarray, here: np.ndarray) -> None:
-        self.id, self.here, self.there = id, here, device.array(here)
+    def __init__(self, device: Device, id: np.ndarray, host: np.ndarray) -> None:
+        self.id, self.host, self.device = id, host, device.array(host)
 
 
 class Images:
@@ -277,9 +277,9 @@ class GhostPlan:
         if not route.leaving and not route.arriving:
             return device.empty(0)
 
-        def pack(there: Any) -> None:
+        def pack(packed: Any) -> None:
             for array, width, column in zip(arrays, widths, columns, strict=True):
-                row = (self._rows, int(width), array.reshape(-1), stride, int(column), there)
+                row = (self._rows, int(width), array.reshape(-1), stride, int(column), packed)
                 device.run(exchange.kernels.pack_rows, route.leaving, *row)
 
         arrived, exchange.staged = route.carry(device, stride, np.dtype(np.float64), pack)

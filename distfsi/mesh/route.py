@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh.communicator import Communicator
 
 
@@ -43,18 +43,18 @@ class Route:
         MPI.Request.Waitall(requests)
 
     def carry(self, device: Device, width: int, real: np.dtype, pack: Callable[[Any], None]) -> tuple[Any, Any]:
-        """As transfer(), from and to the memory of a device: pack(rows) writes there the flat rows, of so many values
+        """As transfer(), from and to the memory of a device: pack(rows) writes the flat rows, of so many values
         each, that leave. Returns those that arrive, on the device, and the memory that it may still read them from."""
         leaving, arriving = (device.message_memory(n * width, real) for n in (self.leaving, self.arriving))
-        there, arrived = device.beneath(leaving), device.beneath(arriving)
-        with device.beside():
-            pack(there)
-            device.take(leaving, there)
-        device.finish_beside()
+        packed, arrived = device.staging_array(leaving), device.staging_array(arriving)
+        with device.asynchronous():
+            pack(packed)
+            device.download_to(leaving, packed)
+        device.finish_asynchronous()
         self.transfer(leaving, arriving, width)
-        with device.beside():
-            device.put(arrived, arriving)
-        device.join()
+        with device.asynchronous():
+            device.upload(arrived, arriving)
+        device.join_asynchronous()
         return arrived, arriving
 
     @staticmethod

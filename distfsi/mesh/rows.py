@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 
 CHUNK = 128  # rows that one thread reduces
 FEW = 64  # chunks that are not worth sharing among threads
@@ -24,14 +24,14 @@ class Rows:
         """The largest of `values` (n,) and `least`; NaN if there is one."""
         found = self.device.empty(chunks(values.shape[0]), values.dtype)
         self.reduce(self._kernels.find_largest, values.shape[0], values, found)
-        return np.max(self.device.get(found), initial=least)
+        return np.max(self.device.download(found), initial=least)
 
     def least(self, values: Any) -> tuple[float, int]:
         """The least of `values` (n,) and its first place, n > 0; a NaN is less than anything."""
         count = values.shape[0]
         least, place = self.device.empty(chunks(count), values.dtype), self.device.empty(chunks(count), np.int64)
         self.reduce(self._kernels.find_least, count, values, least, place)
-        values, places = self.device.get(least), self.device.get(place)
+        values, places = self.device.download(least), self.device.download(place)
         chunk = np.argmin(values)
         return values[chunk], int(places[chunk])
 
@@ -40,7 +40,7 @@ class Rows:
         count, width = values.shape
         found = self.device.empty((chunks(count), 2 * width))
         self.reduce(self._kernels.find_bounds, count, values.reshape(-1), width, found)
-        low, high = np.split(self.device.get(found), 2, axis=1)
+        low, high = np.split(self.device.download(found), 2, axis=1)
         return np.fmin.reduce(low, axis=0, initial=np.inf), np.fmax.reduce(high, axis=0, initial=-np.inf)
 
     def marked(self, mark: Any) -> tuple[int, Any]:
@@ -60,7 +60,7 @@ class Rows:
     def _counts(self, mark: Any) -> np.ndarray:
         counts = self.device.empty(chunks(mark.shape[0]), np.int64)
         self.reduce(self._kernels.count_marked, mark.shape[0], mark, counts)
-        return self.device.get(counts)
+        return self.device.download(counts)
 
     def reduce(self, kernel: Any, rows: int, *arguments: Any) -> None:
         """Run a kernel that takes the number of rows in a chunk first and does a chunk at a time."""
@@ -102,7 +102,7 @@ class Groups:
         runs, width = len(self._group), values.shape[1] if len(values.shape) > 1 else 1
         sums = self._device.empty((runs, width))
         self._device.run(self._kernels.add_rows, runs, self._first, self.rows, width, values.reshape(-1), sums)
-        columns = self._device.get(sums).T
+        columns = self._device.download(sums).T
         return np.stack([np.bincount(self._group, column, self._count) for column in columns], axis=1)
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels import search as kernels
 from distfsi.mesh.rows import Rows

@@ -27,16 +27,16 @@ class Records:
     restart  path of the last restart file, or None
     """
 
-    def __init__(self, simulation, accounts, storage: Storage, origin: Origin | None):
-        """Collective. `accounts` gives the history its columns and rows. Raises OutputError on all ranks."""
+    def __init__(self, simulation, budget, storage: Storage, origin: Origin | None):
+        """Collective. `budget` gives the history its columns and rows. Raises OutputError on all ranks."""
         scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator
         directory = Path(scene.output.directory)
         time, step = (origin.time, origin.step) if origin else (None, None)
         # Without its restart files first: they need the other files.
         self._restarts = RestartWriter(directory, scene, blocks, communicator, storage, step)
         self._fields = FieldWriter(directory, blocks, communicator, storage, time)
-        self._history = History(directory / "history.csv", accounts.columns, communicator, step)
-        self._simulation, self._accounts, self._directory = simulation, accounts, directory
+        self._history = History(directory / "history.csv", budget.columns, communicator, step)
+        self._simulation, self._accounts, self._directory = simulation, budget, directory
         self._fields_due, self._frame = Every(scene.output.fields_every), 0
         self._written_at = -1.0
         self.restart = origin.path if origin else None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
 from distfsi.solid.kernels import contact as kernels
 from distfsi.solid.kernels.bonds import DEBRIS
@@ -41,13 +41,13 @@ class Contact:
         device, count = self._device, near.plan.count
         size, parted = device.empty(count), device.empty(count)
         side, mark = device.empty(count, np.int64), device.empty(count, np.int8)
-        known = (near.plan.key.there, facts, near.position, size)
+        known = (near.plan.key.device, facts, near.position, size)
         device.run(self._kernels.mark_touching, count, near.state, facts, known[0], through, size, parted, side, mark)
         number, rows = self._rows.marked(mark)
         if not self._still_valid(number, rows, known):
             self._then = device.empty(number, np.int64), device.empty((number, self._dimensions)), device.empty(number)
             device.run(self._kernels.remember, number, rows, *known, *self._then)
-            self._table, self._count = self._candidates(c, near, device.get(rows), rows, size, facts)
+            self._table, self._count = self._candidates(c, near, device.download(rows), rows, size, facts)
         self._among = (rows, self._table, self._count)
         self._pairs = (near.position, near.state, reference, size, parted, side)
 
@@ -59,7 +59,7 @@ class Contact:
         return not self._rows.any(mark)
 
     def _candidates(
-        self, c: Columns, near: Near, rows: np.ndarray, there: Any, size: Any, facts: Any
+        self, c: Columns, near: Near, rows: np.ndarray, device_rows: Any, size: Any, facts: Any
     ) -> tuple[Any, Any]:
         """Table (own, width) and number (own,) of the particles among `rows` that may soon touch each of them.
 
@@ -67,16 +67,17 @@ class Contact:
         """
         device = self._device
         position, key, state, size, facts = (
-            self._rows.taken(array, there) for array in (near.position, near.plan.key.there, near.state, size, facts)
+            self._rows.taken(array, device_rows)
+            for array in (near.position, near.plan.key.device, near.state, size, facts)
         )
-        state, debris = device.get(state).copy(), device.get(facts)[:, DEBRIS]
-        reach = (1.0 + SKIN) * device.get(size)
+        state, debris = device.download(state).copy(), device.download(facts)[:, DEBRIS]
+        reach = (1.0 + SKIN) * device.download(size)
         state[:, SMOOTHING] = 0.5 * reach
         own = int(np.searchsorted(rows, near.own))
         cells = reach.max(initial=np.finfo(float).tiny)
         self._search.find(own, position, device.array(state), key, cells)
-        found, key, bonds = device.get(self._search.table), device.get(key), c["bonds"]
-        first, place = np.nonzero(np.arange(found.shape[1]) < device.get(self._search.count)[:, None])
+        found, key, bonds = device.download(self._search.table), device.download(key), c["bonds"]
+        first, place = np.nonzero(np.arange(found.shape[1]) < device.download(self._search.count)[:, None])
         second = found[first, place]
         apart = debris[first] * debris[second] == 0
         first, second = first[apart], second[apart]

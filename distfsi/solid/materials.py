@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from distfsi.device.emit import plain
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.scene.description import (
     Body,
     Compaction,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh import search
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.particles import GhostPlan, Parity
@@ -27,7 +27,7 @@ class Near:
     position  (count, D) [m]
     state     (count, 4 + D) the columns of solid/kernels/pairs.py
     support   how far the widest kernel of all ranks reaches [m]
-    told      what the solid's form wants to know of ghosts and images besides
+    ghost_payload  what the solid's form wants to know of ghosts and images besides
     flags     the largest of each of the form's flags over all ranks
     """
 
@@ -35,7 +35,7 @@ class Near:
     position: Any
     state: Any
     support: float
-    told: list[Any]
+    ghost_payload: list[Any]
     flags: np.ndarray
 
     @property
@@ -99,7 +99,7 @@ class NeighbourSearch:
     def find_among(self, rows: Any, own: int, position: Any, state: Any, key: Any, size: float) -> None:
         """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;
         the others have no neighbours."""
-        chosen = int(np.searchsorted(self._device.get(rows), own))
+        chosen = int(np.searchsorted(self._device.download(rows), own))
         self.find(chosen, *(self._rows.taken(array, rows) for array in (position, state, key)), size)
         table, count = self._device.empty((own, self._width), np.int32), self._device.zeros(own, np.int64)
         self._device.run(self._kernels.place_among, chosen, rows, self.table, self.count, table, count)

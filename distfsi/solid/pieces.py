@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from distfsi.device.seam import Device
+from distfsi.device.interface import Device
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import GhostPlan
@@ -20,7 +20,7 @@ def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, device: Device, co
     """
     local = _smallest(id, links)
     (told,) = plan.exchange([(device.array(local[: plan.own].astype(float)), ((),))])
-    same = np.stack([local, device.get(told)[: len(id)].astype(np.int64)], axis=1)
+    same = np.stack([local, device.download(told)[: len(id)].astype(np.int64)], axis=1)
     same = communicator.concatenate(np.unique(same[same[:, 0] != same[:, 1]], axis=0))
     names, ends = np.unique(same, return_inverse=True)
     merged = _smallest(names, ends.reshape(-1, 2).T)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.seam import Columns, Device, Pair
+from distfsi.device.interface import Columns, Device, DualArray
 from distfsi.errors import Diverged
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
@@ -99,7 +99,7 @@ class Solid:
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
         self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
-        self._home: Pair | None = None
+        self._home: DualArray | None = None
         self.sub_steps = 0
         self._own_particles(scene)
 
@@ -154,8 +154,8 @@ class Solid:
             self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
             self._run(self.kernels.average, 1, *c.read("velocity"), self.before)
         reach = max(reach, support)
-        plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.asked(c), image_reach=reach)
-        given = [(here, "position"), (state, parity + self._vector), *self.form.told(c)]
+        plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
+        given = [(here, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
         position, state, *told = plan.exchange(given)
         self._near = Near(plan, position, state, support, told, flags)
         self._acceleration = device.zeros((own, self.dimensions))
@@ -204,7 +204,7 @@ class Solid:
         self.sub_steps += 1
         self._run(self.kernels.average, self.sub_steps, velocity, self.carried)
 
-    def push(self, impulse: Any) -> Any:
+    def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
 
         Returns by how much (own, D) [m/s], another one, the velocity at which the impulse works on each particle, the
@@ -226,7 +226,7 @@ class Solid:
         if home is self._home:
             return
         self._home, bodies = home, self.given.shape[1]
-        self._block = home.here() - self.blocks.first
+        self._block = home.host() - self.blocks.first
         group = self._block * bodies + self.columns["body"]
         self._order = np.lexsort((self.columns["id"], group))
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import IMAGES, Key, ParticleExchange
@@ -111,7 +111,7 @@ class TotalLagrangian:
         c["viscous_pressure"], c["void"], c["around"] = np.zeros(n), np.zeros(n), np.zeros(n)
         c["crack"], c["parted"] = np.zeros((n, D)), np.full(n, self._support)
         c["loose"] = np.zeros(n, dtype=np.int64)
-        plan = exchange.ghosts(*c.read("position"), c["id"], self._support, self.asked(c))
+        plan = exchange.ghosts(*c.read("position"), c["id"], self._support, self.requested_keys(c))
         volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
         self._place(c, plan.key, *plan.exchange([(*c.read("reference"), "position"), (volume, ((),))]))
         correction, deformation, moments = self._fit(
@@ -119,7 +119,7 @@ class TotalLagrangian:
         )
         c.adopt("correction", correction)
         c.adopt("deformation", deformation)
-        c["exposed"] = (device.get(moments)[:, 0] < EXPOSED_BELOW).astype(np.int64)
+        c["exposed"] = (device.download(moments)[:, 0] < EXPOSED_BELOW).astype(np.int64)
         self.label_pieces(c, exchange)
 
     def label_pieces(self, c: Columns, exchange: ParticleExchange) -> None:
@@ -127,8 +127,8 @@ class TotalLagrangian:
         if self._communicator.maximum(np.array([self._cut_since_labelled]))[0] == 0.0:
             return
         self._cut_since_labelled = False
-        plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.asked(c))
-        id = plan.key.here[plan.key.here % IMAGES == 0] // IMAGES
+        plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.requested_keys(c))
+        id = plan.key.host[plan.key.host % IMAGES == 0] // IMAGES
         order = np.argsort(id, kind="stable")
         pairs = [np.empty((2, 0), dtype=np.int64)]
         for begin, bonds in chunks_of(c["bonds"]):
@@ -145,10 +145,14 @@ class TotalLagrangian:
         body = device.array(c["body"].astype(float))
         given = [(*c.read("position"), "position"), (state, ((),) * 3), (body, ((),))]
         position, state, body = plan.exchange(given)
-        self._search.find(plan.own, position, state, plan.key.there, self._support)
-        table, count, body = device.get(self._search.table), device.get(self._search.count), device.get(body)
+        self._search.find(plan.own, position, state, plan.key.device, self._support)
+        table, count, body = (
+            device.download(self._search.table),
+            device.download(self._search.count),
+            device.download(body),
+        )
         through = self._through_planes(c, exchange)
-        self._through, key = device.array(through), plan.key.here
+        self._through, key = device.array(through), plan.key.host
         body = body.astype(np.int64)
         side = body + len(through) * (key % IMAGES & ~through[body] > 0)  # an image where a body ends is another's
         bonds = []
@@ -182,7 +186,7 @@ class TotalLagrangian:
         if key is self._key:
             return
         self._key = key
-        self._partner = self._rows_of_partners(c, key.here)
+        self._partner = self._rows_of_partners(c, key.host)
         n, width = self._partner.shape
         if n and self._rows.least(self._partner.reshape(-1))[0] < 0:
             raise Diverged("solid: the partner of a bond is not at hand")
@@ -215,11 +219,11 @@ class TotalLagrangian:
 
     # ---- a step -----------------------------------------------------------------------------------------------------
 
-    def asked(self, c: Columns) -> np.ndarray:
+    def requested_keys(self, c: Columns) -> np.ndarray:
         """Keys of the partners that are not among this rank's particles."""
         if c["id"] is not self._ids:
             self._ids, self._key = c["id"], None
-            partner = self._device.get(self._rows_of_partners(c, c["id"] * IMAGES))
+            partner = self._device.download(self._rows_of_partners(c, c["id"] * IMAGES))
             self._asked = np.unique(c["bonds"][partner < 0])
         return self._asked
 
@@ -238,7 +242,7 @@ class TotalLagrangian:
     def _damage(self, c: Columns) -> Any:
         return c.read("damage")[0] if "damage" in c else self._device.empty(0)
 
-    def told(self, c: Columns) -> list:
+    def ghost_payload(self, c: Columns) -> list:
         """Reference position; stiffness, displacement and bond stress; the facts of solid/kernels/bonds.py."""
         axes, D, n = range(self._dimensions), self._dimensions, c.read("id")[0].shape[0]
         vector = tuple((a,) for a in axes)
@@ -254,14 +258,14 @@ class TotalLagrangian:
     def accelerate(self, c: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Cut bonds that have failed; add the `acceleration` (own, D) of all forces to none, and write the
         time steps (own, 2) that they allow."""
-        reference, self._tensions, facts = near.told
+        reference, self._tensions, facts = near.ghost_payload
         self._place(c, near.plan.key, reference, facts)
         damaged, parted = near.flags
         if damaged:
             self._run(near.own, "look_around", *c.read("bond_count"), self._partner, facts, *c.write("around"))
         if parted:
             self._cut(c, near, facts)
-            _, self._tensions, facts = near.plan.exchange(self.told(c))
+            _, self._tensions, facts = near.plan.exchange(self.ghost_payload(c))
             mark = self._device.empty(near.plan.count, np.int8)
             self._run(near.plan.count, "mark_debris", facts, mark)
             self._debris.push_debris(c, near, self._rows.marked(mark)[1], acceleration, limits)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Columns, Device
+from distfsi.device.interface import Columns, Device
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.neighbours import Near, NeighbourSearch
@@ -36,7 +36,7 @@ class UpdatedLagrangian:
     def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
         """There are no bonds that make pieces."""
 
-    def asked(self, columns: Columns) -> np.ndarray | None:
+    def requested_keys(self, columns: Columns) -> np.ndarray | None:
         """Keys of particles and images that are needed wherever they are."""
         return None
 
@@ -44,20 +44,20 @@ class UpdatedLagrangian:
         """What a rank must know of all others."""
         return []
 
-    def told(self, columns: Columns) -> list:
+    def ghost_payload(self, columns: Columns) -> list:
         """What ghosts and images must have besides the state, with parities: the velocity gradient."""
         axes = range(self._dimensions)
         return [(*columns.read("velocity_gradient"), tuple((a, b) for a in axes for b in axes))]
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Write the `acceleration` (own, D) of the forces and the time steps (own, 2) that they allow."""
-        self._search.find(near.own, near.position, near.state, near.plan.key.there, near.support)
-        self._act(near, *near.told, *columns.read("pressure", "deviator"), acceleration, limits)
+        self._search.find(near.own, near.position, near.state, near.plan.key.device, near.support)
+        self._act(near, *near.ghost_payload, *columns.read("pressure", "deviator"), acceleration, limits)
 
     def push_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
         """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure, and
         whose every approach is damped."""
-        self._search.find_among(debris, near.own, near.position, near.state, near.plan.key.there, near.support)
+        self._search.find_among(debris, near.own, near.position, near.state, near.plan.key.device, near.support)
         pressure, deviator = columns.read("pressure", "deviator")
         pushed = self._device.empty(near.own)
         self._device.run(self._kernels.press, near.own, pressure, pushed)

@@ -138,8 +138,8 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
-            coupling.evict()
-            coupling.sealed()
+            coupling.absorb()
+            coupling.trapped()
             coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
             coupling.wall.add_balls(
                 gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)

@@ -92,7 +92,7 @@ def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
         distance = np.hypot(*position.T)
         radius = math.sqrt(np.square(distance[inner]).mean() - inset)
         push = np.interp(time, TIMES, PRESSURES) * 0.5 * math.pi * radius / len(inmost) * dt
-        solid.push(np.where(inner, push / distance, 0.0)[:, None] * position)
+        solid.apply_impulse(np.where(inner, push / distance, 0.0)[:, None] * position)
         solid.migrate()
         time += dt
         if math.isnan(first_failure) and (solid.columns["damage"] >= 1.0).any():

@@ -17,7 +17,7 @@ from distfsi.coupling.cut_cells.kernels.band import FAR
 from distfsi.coupling.cut_cells.sides import Sides
 from distfsi.coupling.cut_cells.wall_particles import WallParticles
 from distfsi.coupling.kernels.cells import COVERED, FLUID
-from distfsi.device.seam import Device, Pair
+from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.fluid.initial import InitialState
 from distfsi.mesh.blocks import Blocks, Snapshot
@@ -46,8 +46,8 @@ PARTICLE_DRIVERS = (
 FLUID_DRIVERS = (
     kernels.take_contents,
     kernels.mark_leaving,
-    kernels.evict,
-    kernels.find_sealed,
+    kernels.absorb,
+    kernels.find_trapped,
     kernels.put_moved,
     kernels.look_around,
     kernels.mix,
@@ -110,9 +110,9 @@ class CutCells:
         self._rest = self._state_at_rest(scene)
         self._rest_there = team.array(self._rest)
 
-        self.kind = Pair(team, blocks.allocate(1, np.uint8))
+        self.kind = DualArray(team, blocks.allocate(1, np.uint8))
         self._fields = 3 if model.phases == 2 else 1
-        self.swept = Pair(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
+        self.swept = DualArray(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
         fluid.volumes = self.swept
         self._state_parity, self._swept_parity = (
             team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0)))
@@ -138,8 +138,8 @@ class CutCells:
 
     def _fill_at_start(self) -> None:
         """Cut cells hold the state at the middle of their open corners; fluid fills what is open."""
-        swept, kind, state = self.swept.here(), self.kind.here(), self.fluid.state
-        swept[:, 0] = self.wall.fractions[1].here()[:, 0]
+        swept, kind, state = self.swept.host(), self.kind.host(), self.fluid.state
+        swept[:, 0] = self.wall.fractions[1].host()[:, 0]
         for block in range(self.blocks.local_count):
             (x, y, z), middles = (a.T for a in self.wall.cut_cells(block))
             state[block][:, z, y, x] = self._initial.at(middles.T)
@@ -158,7 +158,7 @@ class CutCells:
         speed = max(-lowest.min(), highest.max())
         return LARGEST_MOVE * float(self._spacing[: self._dimensions].min()) / max(speed, 1e-300)
 
-    def follow(self) -> None:
+    def update_geometry(self) -> None:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
         team, D = self.team, self._dimensions
         particles = self._particles
@@ -183,8 +183,8 @@ class CutCells:
         self._mix(U, self.wall.parts[0 if first else 1])
         if first:
             self._run(self.fluid_kernels.keep_volumes, self._swept, self.wall.shape, self._start_volume)
-        self.fluid.wake(self.wall.near.here() > 0)
-        self._start, self._input, self._output = self.fluid.there, U, self.fluid.output_of(stage)
+        self.fluid.wake(self.wall.near.host() > 0)
+        self._start, self._input, self._output = self.fluid.device_state, U, self.fluid.output_of(stage)
 
     def after_stage(self, stage: Stage, dt: float) -> None:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
@@ -205,7 +205,7 @@ class CutCells:
 
     def _settle(self) -> None:
         """Mix what the last stage left, and exchange volumes so that they stay near the geometric ones."""
-        U, after, wall, k = self.fluid.there, self.wall.parts[1], self.wall, self.fluid_kernels
+        U, after, wall, k = self.fluid.device_state, self.wall.parts[1], self.wall, self.fluid_kernels
         self._mix(U, after)
         lists = [(cells, self._mixed(cells)) for cells in (self._band, self._loose)]
         for _ in range(2):
@@ -217,9 +217,9 @@ class CutCells:
                 )  # fmt: skip
             for cells, mixed in lists:
                 self.team.run(k.put_mixed, cells.shape[0], cells, mixed, U, self._swept, wall.shape)
-        self._near_ghosts.exchange((self.swept.there, self._swept_parity))
+        self._near_ghosts.exchange((self.swept.device, self._swept_parity))
 
-    def impulse(self) -> Any:
+    def transfer_impulse(self) -> Any:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
         given = self._forces.impulse_on(self.solid)
         paid = np.zeros((self.blocks.local_count, self._dimensions + 1))
@@ -230,7 +230,7 @@ class CutCells:
         """The fluid moves the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
         found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
         block, paid = self.dust.drag(
-            self.solid.columns, rows, self.solid.start, self._dt, impulse, (self.fluid.there, self._swept),
+            self.solid.columns, rows, self.solid.start, self._dt, impulse, (self.fluid.device_state, self._swept),
             self._input, self._kinds,
         )  # fmt: skip
         sums = np.zeros((self.blocks.local_count, self._dimensions + 1))
@@ -238,11 +238,11 @@ class CutCells:
         self.fluid.wake(np.bincount(block, minlength=len(sums)) > 0)
         return sums
 
-    def book_work(self, excess: Any) -> None:
-        """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
-        wall: the fluid pays for it."""
+    def account_work(self, excess: Any) -> None:
+        """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
+        velocity of the wall: the fluid pays for it."""
         D, P = self._dimensions, self.model.phases
-        fluid = (self._joined, self.fluid.there, self._swept, *self._company)
+        fluid = (self._joined, self.fluid.device_state, self._swept, *self._company)
         impulse, work = self._forces.pay(self.solid, excess, *fluid)
         self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse - self._dragged[:, :-1]
         self._wall_sums[:, -1] += self.solid.work - work - self._dragged[:, -1]
@@ -252,23 +252,25 @@ class CutCells:
         highest = self._rows.largest(self._forces.pressures(), 0.0) / dt
         return float(self.blocks.communicator.maximum(np.array([highest]))[0])
 
-    def sealed(self) -> np.ndarray:
+    def trapped(self) -> np.ndarray:
         """Collective. Mass [kg] of each phase in cells that are shut: it neither flows nor pushes."""
         held = self.team.empty((self._band.shape[0], self.model.phases))
-        self._run(self.fluid_kernels.find_sealed, held, self._kinds, self.fluid.there, self._swept, self.wall.shape)
+        self._run(
+            self.fluid_kernels.find_trapped, held, self._kinds, self.fluid.device_state, self._swept, self.wall.shape
+        )
         return self.blocks.sum(self._cell_volume * self._groups.sums(held))
 
     def let_fluid_leave(self) -> None:
         """All that the fluid holds leaves the domain; from now on no cell has any."""
         self.fluid.leave(self.volume)
-        self.swept.here()[:] = 0.0
+        self.swept.host()[:] = 0.0
         self.swept.changed()
         self._classify()
 
     def _classify(self) -> None:
         """Which cells are covered, by what they hold."""
-        holds = self.swept.here()[:, :1] > 0.0
-        self.kind.here()[:] = np.where(holds, FLUID, COVERED)
+        holds = self.swept.host()[:, :1] > 0.0
+        self.kind.host()[:] = np.where(holds, FLUID, COVERED)
         self.kind.changed()
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
@@ -276,27 +278,27 @@ class CutCells:
     def _find_company(self) -> None:
         """Which cells join which, and the lists of the band's, the covered and the loose cells."""
         self.wall.find_masters(self._kinds, self._masters, self._swept, self._fields)
-        self._exchange(self.kind.there, np.array([-1]), FLUID)
+        self._exchange(self.kind.device, np.array([-1]), FLUID)
         self.wall.find_refuges(self._kinds, self._masters)
         self._exchange(self._master, np.arange(self._dimensions), 0)
         self._list_cells()
-        self._run(self.fluid_kernels.take_contents, self.fluid.there, self._swept, self.wall.shape)
+        self._run(self.fluid_kernels.take_contents, self.fluid.device_state, self._swept, self.wall.shape)
         mark = self.team.empty(self._band.shape[0], np.int8)
         self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
         found = np.array([float(self._rows.any(mark)), float(self._lone.shape[0])])
         leaving, lone = self.blocks.communicator.maximum(found)
         if leaving > 0.0:
-            self.evict()
+            self.absorb()
         self._expands = int(lone > 0.0 and not self._stairs)
         self._look_around()
 
-    def evict(self) -> None:
+    def absorb(self) -> None:
         """Collective. Contents of cells that are shut move, and these are covered."""
-        U, wall, k = self.fluid.there, self.wall, self.fluid_kernels
+        U, wall, k = self.fluid.device_state, self.wall, self.fluid_kernels
         self._exchange_contents(U)
         moved = self.team.empty((self._band.shape[0], self.model.variables + 3), U.dtype)
         self._run(
-            k.evict, moved, U, self._swept, self._kinds, wall.parts[0], self._masters, wall.steps, wall.shape
+            k.absorb, moved, U, self._swept, self._kinds, wall.parts[0], self._masters, wall.steps, wall.shape
         )  # fmt: skip
         self._run(k.put_moved, moved, U, self._swept, wall.shape)
         wall.cover_evicted(self._kinds, self._masters)
@@ -343,11 +345,11 @@ class CutCells:
 
     @property
     def _swept(self) -> Any:
-        return self.swept.there.reshape(-1)
+        return self.swept.device.reshape(-1)
 
     @property
     def _kinds(self) -> Any:
-        return self.kind.there.reshape(-1)
+        return self.kind.device.reshape(-1)
 
     @property
     def _masters(self) -> Any:
@@ -369,22 +371,22 @@ class CutCells:
 
     def _exchange_contents(self, U: Any) -> None:
         """Of the cells around the wall."""
-        self._near_ghosts.exchange((U, self._state_parity), (self.swept.there, self._swept_parity))
+        self._near_ghosts.exchange((U, self._state_parity), (self.swept.device, self._swept_parity))
 
     def _exchange_swept(self) -> None:
-        self._exchange(self.swept.there, np.full(self._fields, -1), 1.0)
+        self._exchange(self.swept.device, np.full(self._fields, -1), 1.0)
 
     # ---- looking at it ----------------------------------------------------------------------------------------------
 
     @property
     def covered(self) -> np.ndarray:
         """(local blocks, Z, Y, X) whether a cell holds no fluid, ghosts included."""
-        return self.swept.here()[:, 0] <= 0.0
+        return self.swept.host()[:, 0] <= 0.0
 
     @property
     def volume(self) -> np.ndarray:
         """(local blocks, Z, Y, X) the part of each cell that its fluid fills."""
-        return self.swept.here()[:, 0]
+        return self.swept.host()[:, 0]
 
     def memory(self) -> int:
         """Bytes of this rank's fields, the corners' as if they were as many as cells."""
@@ -399,21 +401,21 @@ class CutCells:
     def snapshot(self) -> Snapshot:
         """What a restart needs: the volumes, and the books."""
         return {
-            "cells": {"swept": self.blocks.without_ghosts(self.swept.here()[:, :1])},
-            "sums": {"wall": self._wall_sums, "sides": self._sides.passed.here()},
+            "cells": {"swept": self.blocks.without_ghosts(self.swept.host()[:, :1])},
+            "sums": {"wall": self._wall_sums, "sides": self._sides.passed.host()},
             "values": {"way": np.array(self._particles.thickness.way)},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Collective. Go on from a snapshot, after the solid has."""
-        self.blocks.without_ghosts(self.swept.here()[:, :1])[:] = snapshot["cells"]["swept"]
+        self.blocks.without_ghosts(self.swept.host()[:, :1])[:] = snapshot["cells"]["swept"]
         self.swept.changed()
         self._classify()
         self._exchange_swept()
         self._particles.thickness.way = float(snapshot["values"]["way"])
         self._wall_sums[:] = snapshot["sums"]["wall"]
         self._sides.restore(snapshot["sums"]["sides"])
-        self.wall.near.here()[:] = 1
+        self.wall.near.host()[:] = 1
         self.wall.near.changed()
         position, velocity = self.solid.columns.read("position", "velocity")
         self._particles.look(position)

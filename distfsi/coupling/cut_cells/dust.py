@@ -10,7 +10,7 @@ import numpy as np
 
 from distfsi.coupling.cut_cells.geometry import WallGeometry
 from distfsi.coupling.cut_cells.kernels import dust as kernels
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
 from distfsi.mesh.search import SearchCells
 
@@ -59,7 +59,7 @@ class Dust:
         count, rows = self._rows.marked(mark)
         if count == 0:
             return rows
-        found = self._device.get(rows)
+        found = self._device.download(rows)
         return self._device.array(found[np.argsort(c["id"][found])])
 
     def drag(
@@ -83,5 +83,5 @@ class Dust:
         device.run(
             k.pay_drag, n, *where, velocity, mass, impulse, paid, *gas, cell_volume, wall.shape, wall.spacing, *bins
         )
-        cell, paid = device.get(at), device.get(paid)
+        cell, paid = device.download(at), device.download(paid)
         return cell[cell >= 0] // prod(wall.blocks.shape), paid[cell >= 0]

@@ -88,9 +88,9 @@ class WallForces:
         return given
 
     def pay(self, solid: Solid, excess: Any, joined: Any, U: Any, swept: Any, *company: Any) -> tuple[Any, Any]:
-        """Collective, after solid.push(), whose impulse worked at the `excess` (own, D) [m/s] over the velocity of the
-        wall: the fluid in U and `swept` pays for it, cells for those that `joined` them. Returns what it has given in
-        the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
+        """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
+        velocity of the wall: the fluid in U and `swept` pays for it, cells for those that `joined` them. Returns what
+        it has given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
         team, own, D, kernels = self._team, solid.count, self._D, self._kernels
         vector, gains = tuple((a,) for a in range(D)), team.empty((own, 2 * D + 1))
         team.run(kernels.find_gains, own, solid.carried, excess, self._shared, gains)

@@ -12,7 +12,7 @@ import numpy as np
 
 from distfsi.coupling.cut_cells.kernels import band, wall_distance
 from distfsi.coupling.cut_cells.kernels import geometry as kernels
-from distfsi.device.seam import Device, Pair
+from distfsi.device.interface import Device, DualArray
 from distfsi.mesh import search
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.kernels.rows import count_marked, list_marked, take_rows
@@ -137,13 +137,13 @@ class WallGeometry:
         """The fields, of cells that are all open."""
         blocks, team, D = self.blocks, self.team, self.blocks.grid.dimensions
         count = blocks.local_count
-        self.fractions = tuple(Pair(team, np.ones((count, 1, *blocks.shape), real)) for _ in range(2))
-        self.apertures = tuple(Pair(team, np.ones((count, D, *blocks.shape), real)) for _ in range(2))
-        self.near = Pair(team, np.ones(count, dtype=np.uint8))
+        self.fractions = tuple(DualArray(team, np.ones((count, 1, *blocks.shape), real)) for _ in range(2))
+        self.apertures = tuple(DualArray(team, np.ones((count, D, *blocks.shape), real)) for _ in range(2))
+        self.near = DualArray(team, np.ones(count, dtype=np.uint8))
         self.mark = team.array(blocks.allocate(1, np.int8))
         self._whole, self._plain = (team.array(blocks.allocate(1, np.uint8)).reshape(-1) for _ in range(2))
         corners = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
-        self._distance = Pair(team, np.full((count, *corners), self.radius))
+        self._distance = DualArray(team, np.full((count, *corners), self.radius))
         self._count = count * prod(blocks.shape[:2])  # of rows of cells along x
         self._corner_rows = count * prod(corners[:2])
 
@@ -160,10 +160,10 @@ class WallGeometry:
         near each other follow each other. Where one is computed at a time the order does not matter."""
         if self.lanes == 1:
             return values
-        row, x = np.divmod(self.team.get(at), shape[2])
+        row, x = np.divmod(self.team.download(at), shape[2])
         layer, y = np.divmod(row, shape[1])
         brick = (layer // 2 * shape[1] + y // 2) * shape[2] + x // 2
-        return self.team.array(self.team.get(values)[np.argsort(brick, kind="stable")])
+        return self.team.array(self.team.download(values)[np.argsort(brick, kind="stable")])
 
     def fill(self, own: int, chosen: Any, position: Any, volume: Any, bins: SearchCells) -> Any:
         """Share of the broad kernel around each of the first `own` particles that is filled, and the mean way [m] to
@@ -185,7 +185,7 @@ class WallGeometry:
     def cut(self, position: Any, volume: Any, ball: Any, key: Any, bins: SearchCells) -> None:
         """The new geometry becomes the old one, and that of these particles the new one."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
-        run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.there
+        run, k, count, near = self.team.run, self.kernels, self.blocks.local_count, self.near.device
         mark = self.team.empty(position.shape[0], np.int8)
         run(k.mark_balls, position.shape[0], ball, volume, mark)
         balls, rows = self._rows.marked(mark)
@@ -211,11 +211,11 @@ class WallGeometry:
         """The corners (n,) that may have particles within `reach` [m]; the others are open."""
         mark = self.team.zeros(self._corners.shape[0], np.int8)
         self.team.run(
-            self.kernels.mark_corners, self._corner_rows, self.near.there, self._corners, mark, self.radius, reach,
+            self.kernels.mark_corners, self._corner_rows, self.near.device, self._corners, mark, self.radius, reach,
             bins.start, *bins[2:], self.shape, *self._grid,
         )  # fmt: skip
         corners = self._rows.marked(mark)[1]
-        return self.near_order(corners, corners, self._distance.there.shape[1:])
+        return self.near_order(corners, corners, self._distance.device.shape[1:])
 
     def add_balls(self, corners: Any, position: Any, ball: Any, key: Any) -> None:
         """Distances at the `corners` become those to these particles' balls where they are nearer."""
@@ -228,29 +228,29 @@ class WallGeometry:
     @property
     def _corners(self) -> Any:
         """Flat distances."""
-        return self._distance.there.reshape(-1)
+        return self._distance.device.reshape(-1)
 
     @property
     def parts(self) -> tuple[Any, Any]:
         """Flat fractions, old and new."""
-        return tuple(field.there.reshape(-1) for field in self.fractions)
+        return tuple(field.device.reshape(-1) for field in self.fractions)
 
     @property
     def faces(self) -> tuple[Any, Any]:
         """Flat apertures, old and new."""
-        return tuple(field.there.reshape(-1) for field in self.apertures)
+        return tuple(field.device.reshape(-1) for field in self.apertures)
 
     def cut_cells(self, block: int) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, D) [x first] in memory of a block's cells that are cut, and the middles (n, D) [m] of their open
         corners, each by its distance from the wall."""
         D, blocks, grid = self.blocks.grid.dimensions, self.blocks, self.blocks.grid
-        part, extent = self.fractions[1].here()[block, 0], blocks.extent[block]
+        part, extent = self.fractions[1].host()[block, 0], blocks.extent[block]
         inner = tuple(slice(g, g + n) for g, n in zip(grid.ghosts[::-1], extent[::-1], strict=True))
         place = np.argwhere((part[inner] > 0.0) & (part[inner] < 1.0))[:, ::-1] + grid.ghosts
         weight, middle = np.zeros(len(place)), np.zeros((len(place), D))
         for corner in product((0, 1), repeat=D):
             at = place + np.pad(corner, (0, 3 - D))
-            free = np.maximum(self._distance.here()[block][tuple(at.T[::-1])], 0.0)
+            free = np.maximum(self._distance.host()[block][tuple(at.T[::-1])], 0.0)
             x = np.array(grid.lower[:D]) + (blocks.origin[block] - grid.ghosts + at)[:, :D] * grid.spacing[:D]
             weight, middle = weight + free, middle + free[:, None] * x
         return place, middle / weight[:, None]
@@ -290,9 +290,9 @@ class WallGeometry:
             k.find_band, rows, near.read, self._plain, mark, whole, kind, *share, self.offsets, self.steps, self.shape,
             self.extent, found,
         )  # fmt: skip
-        counts = self.team.get(found)
+        counts = self.team.download(found)
         in_blocks = counts.reshape(self.blocks.local_count, prod(self.blocks.shape[:2]), 3).sum(axis=1)
-        near.here()[(near.here() != wall_distance.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
+        near.host()[(near.host() != wall_distance.CUT) & (in_blocks.sum(axis=1) == 0)] = 0
         near.changed()
         first = self.team.array(np.cumsum(counts, axis=0) - counts)
         lists = [self.team.empty(n, np.int64) for n in in_blocks.sum(axis=0)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from distfsi.coupling.cut_cells.geometry import WallGeometry
 from distfsi.coupling.cut_cells.kernels import fluxes as cut_fluxes
-from distfsi.device.seam import Pair
+from distfsi.device.interface import DualArray
 from distfsi.fluid.fluid import Fluid
 
 DRIVERS = (cut_fluxes.book_sides,)
@@ -38,7 +38,7 @@ class Sides:
         cell, side = np.concatenate(places), np.concatenate(sides)
         self._block = cell // prod(blocks.shape)
         self._cells = [self._team.array(a) for a in (cell, side)]
-        self.passed = Pair(self._team, np.zeros((len(side), conserved)))
+        self.passed = DualArray(self._team, np.zeros((len(side), conserved)))
 
     def choose(self) -> None:
         """After the band is known: the cells in it count."""
@@ -46,15 +46,15 @@ class Sides:
 
     def book(self, U: Any, walls: tuple[Any, ...], rates: Any, weights: Any) -> None:
         """Add what a stage with the input U gets wrong; `walls`, `rates`, `weights` as book_sides() has them."""
-        given = (self._near, *self._cells, self.passed.there, U, *walls, rates, weights)
+        given = (self._near, *self._cells, self.passed.device, U, *walls, rates, weights)
         self._team.run(self._kernels.book_sides, self._near.shape[0], *given)
 
     def sums(self) -> np.ndarray:
         """`passed` of this rank's blocks (local blocks, conserved)."""
-        count, passed = self._wall.blocks.local_count, self.passed.here()
+        count, passed = self._wall.blocks.local_count, self.passed.host()
         return np.stack([np.bincount(self._block, amounts, count) for amounts in passed.T], axis=1)
 
     def restore(self, passed: np.ndarray) -> None:
         """Go on from an earlier `passed`."""
-        self.passed.here()[:] = passed
+        self.passed.host()[:] = passed
         self.passed.changed()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.coupling.cut_cells.geometry import WallGeometry
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.mesh.particles import GhostPlan
 from distfsi.mesh.search import SearchCells
 
@@ -33,7 +33,7 @@ class Thickness:
         vector = tuple((axis,) for axis in range(self._D))
         (own,) = c.read("ball")
         if split or self.way > self._farthest:
-            given = (self._wall.coarse_order(position, plan.key.there), position, volume, bins)
+            given = (self._wall.coarse_order(position, plan.key.device), position, volume, bins)
             (filled,) = plan.exchange([(self._wall.fill(plan.own, *given), ((), *vector))])
             own = self._wall.thicken(plan.own, filled, *given)
             self.way = np.inf if split else 0.0

@@ -60,7 +60,7 @@ class WallParticles:
         self._split = split > 0.0
         self.plan = self._ghosts(start, c["id"])
         (self.middle,) = self.plan.exchange([(self.own_middle, "position")])
-        self.bins = self._wall.sort(self.middle, self.plan.key.there)
+        self.bins = self._wall.sort(self.middle, self.plan.key.device)
         return farthest
 
     def cut(self, start: Any, velocity: Any) -> None:
@@ -78,15 +78,15 @@ class WallParticles:
         inside = team.empty((point.shape[0], 2))
         team.run(k.keep_inside, point.shape[0], point, size, *self._corners, inside)
         position, volume = plan.exchange([(point, "position"), (inside, ((), ()))])
-        bins = wall.sort(position, plan.key.there)
-        points = (plan.key.there, volume, position, *bins)
+        bins = wall.sort(position, plan.key.device)
+        points = (plan.key.device, volume, position, *bins)
         self.image, image = self._weigh_images(plan, point, size, points)
-        team.run(k.fade_images, plan.count, plan.key.there, image, 2, volume.reshape(-1))
+        team.run(k.fade_images, plan.count, plan.key.device, image, 2, volume.reshape(-1))
         if self._split:
             self.image, image = self._weigh_images(self.plan, *c.read("position"), self._points.volumes(c), points)
-        team.run(k.fade_images, self.plan.count, self.plan.key.there, image, 1, self.mass)
+        team.run(k.fade_images, self.plan.count, self.plan.key.device, image, 1, self.mass)
         ball = self.thickness.balls(c, plan, position, volume, bins, self._split)
-        wall.cut(position, volume, ball, plan.key.there, bins)
+        wall.cut(position, volume, ball, plan.key.device, bins)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
         """Collective. Who needs copies of which particles or points."""

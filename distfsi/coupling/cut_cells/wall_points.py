@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.seam import Columns
+from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
 
 FARTHEST = 1.25  # between points, in units of half a cell or of the particles' spacing, if that is more
@@ -48,8 +48,8 @@ class WallPoints:
         if stretched.shape[0] == 0:
             return position, volume, number
         taken = (self._rows.taken(a, stretched) for a in (position, volume, *c.read("volume", "deformation")))
-        points = self._split(*(self._device.get(a) for a in taken))
-        rows = self._device.get(stretched)
+        points = self._split(*(self._device.download(a) for a in taken))
+        rows = self._device.download(stretched)
         others = np.delete(np.arange(own), rows)
         chosen = self._device.array(np.concatenate([others, own + np.arange(len(points[0]))]))
         place, size = (

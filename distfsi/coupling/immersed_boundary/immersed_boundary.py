@@ -11,7 +11,7 @@ import numpy as np
 from distfsi.coupling.immersed_boundary import kernels
 from distfsi.coupling.kernels import cells as kinds
 from distfsi.coupling.kernels import spreading as push
-from distfsi.device.seam import Device, Pair
+from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.fluid.initial import InitialState
 from distfsi.mesh import search
@@ -77,22 +77,22 @@ class Coupling:
         D = grid.dimensions
         self._cells = search.CellSort(self.kernels, team, np.array(grid.lower[:D]), np.array(grid.upper[:D]))
         self._spacing, self._cell_volume = np.array(grid.spacing), float(np.prod(grid.spacing))
-        self._shape, self._lower, self._widths = map(self._there, (blocks.shape, grid.lower, grid.spacing))
+        self._shape, self._lower, self._widths = map(self._upload, (blocks.shape, grid.lower, grid.spacing))
         self._origin, self._extent = team.array(blocks.origin), team.array(blocks.extent)
-        self._homes = [self._there(values) for values in (grid.cells, blocks.block_cells, blocks.curve_index)]
+        self._homes = [self._upload(values) for values in (grid.cells, blocks.block_cells, blocks.curve_index)]
         self._real = np.dtype(scene.fluid.precision)
         self._rest = team.array(self._state_at_rest(scene))
         self._find_neighbourhood()
         self._find_sides()
 
-        self.kind = Pair(team, np.full((blocks.local_count, 1, *blocks.shape), kinds.UNKNOWN, np.uint8))
-        self._occupied = Pair(team, np.ones(blocks.local_count, dtype=np.uint8))
+        self.kind = DualArray(team, np.full((blocks.local_count, 1, *blocks.shape), kinds.UNKNOWN, np.uint8))
+        self._occupied = DualArray(team, np.ones(blocks.local_count, dtype=np.uint8))
         self._kick = team.array(blocks.allocate(grid.dimensions))
         self._ledger = {cause: np.zeros((blocks.local_count, model.conserved)) for cause in self.causes[:-1]}
         solid.prepare(self.reach)
-        self.follow()
+        self.update_geometry()
 
-    def _there(self, values: Any) -> Any:
+    def _upload(self, values: Any) -> Any:
         return self.team.array(np.array(values))
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
@@ -113,7 +113,7 @@ class Coupling:
         weights = (1.0 / ((around * self._spacing[:D]) ** 2).sum(axis=1)).astype(self._real)
         rings = np.searchsorted(np.sort(ring), np.arange(1, GHOSTS + 2))
         self._steps, self._offsets, self._weights, self._rings = map(
-            self._there, (steps, around @ steps[:D], weights, rings)
+            self._upload, (steps, around @ steps[:D], weights, rings)
         )
 
     def _find_sides(self) -> None:
@@ -133,7 +133,7 @@ class Coupling:
         places = np.concatenate(places)
         self._side_blocks = places // prod(blocks.shape)
         self._sides = [self.team.array(places), self.team.array(np.concatenate(sides))]
-        self._through_sides = Pair(self.team, np.zeros((len(places), self.model.conserved)))
+        self._through_sides = DualArray(self.team, np.zeros((len(places), self.model.conserved)))
         images = GHOSTS * (np.array(grid.boundaries) == "symmetry")
         self._seen_cells = self.team.array(np.column_stack([-images[:, 0], grid.cells + images[:, 1]]))
 
@@ -143,20 +143,20 @@ class Coupling:
         """Longest step [s] that the coupling allows: any."""
         return np.inf
 
-    def follow(self) -> None:
+    def update_geometry(self) -> None:
         """Collective. Find the covered cells, and the velocity of the wall in those that fluxes see."""
         around, team, blocks, D = self.solid.around, self.team, self.blocks, self._dimensions
         position, count = around.position, around.position.shape[0]
         volume, momentum = team.empty((count, 1)), team.empty((count, 1 + D))
         team.run(self.kernels.find_amounts, count, around.state, volume, momentum)
-        _, bins = self._cells.sort(position, around.plan.key.there, self._spacing[:D].min())
+        _, bins = self._cells.sort(position, around.plan.key.device, self._spacing[:D].min())
         lost = team.zeros((blocks.local_count, self.model.conserved))
         team.run(
-            self.fluid_kernels.cover, blocks.local_count, self._kinds, self._occupied.there, self.fluid.there, lost,
-            self.cover_radius, volume, position, *bins, self._shape, self._widths, self._origin, self._extent,
+            self.fluid_kernels.cover, blocks.local_count, self._kinds, self._occupied.device, self.fluid.device_state,
+            lost, self.cover_radius, volume, position, *bins, self._shape, self._widths, self._origin, self._extent,
         )  # fmt: skip
-        self._ledger["covered"] -= team.get(lost) * self._cell_volume
-        self._exchange(self.kind.there, np.array([-1]), kinds.COVERED)
+        self._ledger["covered"] -= team.download(lost) * self._cell_volume
+        self._exchange(self.kind.device, np.array([-1]), kinds.COVERED)
         self._list_cells()
         n = self._covered.shape[0]
         self._velocity, self._inertia = team.empty((n, D), self._real), team.empty(n)
@@ -171,7 +171,7 @@ class Coupling:
         states (Eqs. 31, 32)."""
         self.fluid.exchange_ghosts(stage)
         U, k = self.fluid.input_of(stage), self.fluid_kernels
-        self.fluid.wake(self._occupied.here() > 0)
+        self.fluid.wake(self._occupied.host() > 0)
         around = (self._kinds, self._shape, self._offsets, self._weights, self._rings, self._rest)
         self._input = U
         self._run(k.fill_covered, self._covered, self._velocity, U, *around)
@@ -186,12 +186,12 @@ class Coupling:
         """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage (Eqs. 33,
         35)."""
         weights = self.team.array(stage.weight * dt * self._cell_volume / self._spacing)
-        rates = self._there(self.fluid.rates(dt)[: self._dimensions])
+        rates = self._upload(self.fluid.rates(dt)[: self._dimensions])
         rest = (self._input, self._kinds, self._shape, self._steps, rates, weights)
         self._run(self.fluid_kernels.collect_wall, self._covered, self._passed, *rest)
-        self._run(self.fluid_kernels.collect_sides, *self._sides, self._through_sides.there, *rest)
+        self._run(self.fluid_kernels.collect_sides, *self._sides, self._through_sides.device, *rest)
 
-    def impulse(self) -> Any:
+    def transfer_impulse(self) -> Any:
         """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
         D, own, team = self._dimensions, self.solid.count, self.team
         wall = (self._covered, self._passed, self._velocity, self._inertia)
@@ -210,8 +210,8 @@ class Coupling:
         self._ledger["wall"] -= self._per_block(kinds.COVERED_CELLS, self._passed)
         return impulse
 
-    def book_work(self, excess: Any) -> None:
-        """Enter what the solid has received, after solid.push()."""
+    def account_work(self, excess: Any) -> None:
+        """Enter what the solid has received, after solid.apply_impulse()."""
         D, P = self._dimensions, self.model.phases
         self._ledger["wall"][:, P : P + D] += self.solid.given.sum(axis=1)
         self._ledger["wall"][:, -1] += self.solid.work
@@ -224,7 +224,7 @@ class Coupling:
         counts = team.empty((count, 3), np.int64)
         place = (self._kinds, self._occupied.read, self._shape, self._extent)
         team.run(self.kernels.find_depth, count, *place, self._offsets, counts)
-        self._counts = team.get(counts)
+        self._counts = team.download(counts)
         first = team.array(np.cumsum(self._counts, axis=0) - self._counts)
         lists = [team.empty(n, np.int64) for n in self._counts.sum(axis=0)]
         team.run(self.kernels.list_cells, count, *place, first, *lists)
@@ -232,7 +232,7 @@ class Coupling:
 
     @property
     def _kinds(self) -> Any:
-        return self.kind.there.reshape(-1)
+        return self.kind.device.reshape(-1)
 
     def _run(self, kernel: Any, cells: Any, *arguments: Any) -> None:
         self.team.run(kernel, cells.shape[0], cells, *arguments)
@@ -250,9 +250,9 @@ class Coupling:
     @property
     def covered(self) -> np.ndarray:
         """(local blocks, Z, Y, X) whether the solid covers a cell, ghosts included."""
-        return self.kind.here()[:, 0] >= kinds.COVERED
+        return self.kind.host()[:, 0] >= kinds.COVERED
 
-    def sealed(self) -> np.ndarray:
+    def trapped(self) -> np.ndarray:
         """Mass [kg] of each phase that is shut in: none."""
         return np.zeros(self.model.phases)
 
@@ -272,22 +272,22 @@ class Coupling:
     def snapshot(self) -> Snapshot:
         """What a restart needs: which cells are covered, so that those are known that come free; and the books."""
         return {
-            "cells": {"kind": self.blocks.without_ghosts(self.kind.here())},
-            "sums": {**self._ledger, "sides": self._through_sides.here()},
+            "cells": {"kind": self.blocks.without_ghosts(self.kind.host())},
+            "sums": {**self._ledger, "sides": self._through_sides.host()},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.blocks.without_ghosts(self.kind.here())[:] = snapshot["cells"]["kind"]
-        self._occupied.here()[:] = 1
-        for cause, amounts in {**self._ledger, "sides": self._through_sides.here()}.items():
+        self.blocks.without_ghosts(self.kind.host())[:] = snapshot["cells"]["kind"]
+        self._occupied.host()[:] = 1
+        for cause, amounts in {**self._ledger, "sides": self._through_sides.host()}.items():
             amounts[:] = snapshot["sums"][cause]
         for pair in (self.kind, self._occupied, self._through_sides):
             pair.changed()
 
     def ledger(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
-        count, through = self.blocks.local_count, self._through_sides.here()
+        count, through = self.blocks.local_count, self._through_sides.host()
         sides = np.stack([np.bincount(self._side_blocks, amounts, count) for amounts in through.T], axis=1)
         totals = self.blocks.sum(np.hstack([*self._ledger.values(), sides]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

@@ -67,13 +67,13 @@ def unseen_share(rates, moved, relative2):
     """How much of its linear viscosity a particle has, 0 to 1: by the share of its partners' motion that is not linear.
 
     `relative2` is the sum of w (v_j - v_i)^2 and `moved` that of (v_j - v_i) g, for which `rates` is the fit of least
-    squares; what the fit accounts for is rates : moved.
+    squares; what the fit budget for is rates : moved.
     """
     return min(ROUGH * max(1.0 - contraction(rates, moved) / max(relative2, SHORTEST), 0.0), 1.0)
 
 
 def shocked_share(divergence, size, sound_speed):
-    """The same by the jump of velocity, where what no linear field accounts for is a crack or a contact."""
+    """The same by the jump of velocity, where what no linear field budget for is a crack or a contact."""
     return min(SHOCKED * max(-size * divergence, 0.0) / sound_speed, 1.0)
 
 

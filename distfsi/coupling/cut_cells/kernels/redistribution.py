@@ -109,7 +109,7 @@ def mark_leaving(begin, end, band, mark, kind, master, shape, steps):
 
 
 @driver
-def evict(begin, end, band, moved, U, swept, kind, fraction, master, steps, shape):
+def absorb(begin, end, band, moved, U, swept, kind, fraction, master, steps, shape):
     """moved (n, VARIABLES + 3) = contents, phase energies and volumes of the band's cells after those that are shut
     have handed theirs to a neighbour."""
     cells = shape[0] * shape[1] * shape[2]
@@ -139,7 +139,7 @@ def put_moved(begin, end, band, moved, U, swept, shape):
 
 
 @driver
-def find_sealed(begin, end, band, held, kind, U, swept, shape):
+def find_trapped(begin, end, band, held, kind, U, swept, shape):
     """held (n, PHASES) [kg/m3] = masses per volume of a cell in the band whose fluid is shut in, 0 of the others."""
     cells = shape[0] * shape[1] * shape[2]
     for n in range(begin, end):

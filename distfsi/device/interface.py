@@ -1,8 +1,9 @@
 """What a part may ask of the device that holds its arrays: the CPU (device/cpu.py), a GPU (device/gpu.py with
 device/cuda.py), or CUDA C on the host (device/gpu.py with device/host.py).
 
-A device has two queues. What is asked for is done in the order of asking, except for what is asked for `beside()`: that
-comes after all asked before, but only `join()` makes what is asked for later wait for it. On the CPU everything is done
+A device has two queues. What is asked for is done in the order of asking, except for what is asked for in
+`asynchronous()`: that comes after all asked before, but only `join_asynchronous()` makes what is asked for later wait
+for it. On the CPU everything is done
 at once, and the arrays of the device are those of the host.
 """
 
@@ -57,77 +58,77 @@ class Device(Protocol):
 
     def message_memory(self, count: int, dtype: np.dtype) -> Any:
         """Flat memory that MPI sends from and receives in: the host's, or the device's where MPI is to take that. MPI
-        is given no memory of the device before all that was asked for beside is done."""
+        is given no memory of the device before all asynchronous work is done."""
 
-    def beneath(self, message: Any) -> Any:
+    def staging_array(self, message: Any) -> Any:
         """An array of the device like some `message_memory`, for copies between them; where they are one, itself."""
 
-    def get(self, there: Any) -> np.ndarray:
+    def download(self, array: Any) -> np.ndarray:
         """The values of an array of the device, when all that was asked for before is done."""
 
-    def put(self, there: Any, host: Any) -> None:
+    def upload(self, array: Any, host: Any) -> None:
         """Give an array of the device the values of one of the host, which must stay as it is until that is done; or of
         `message_memory`."""
 
-    def take(self, message: Any, there: Any) -> None:
-        """Give `message_memory` the values of an array of the device; they are there after `finish_beside`."""
+    def download_to(self, message: Any, array: Any) -> None:
+        """Give `message_memory` the values of an array of the device; they are there after `finish_asynchronous`."""
 
-    def beside(self) -> AbstractContextManager[None]:
+    def asynchronous(self) -> AbstractContextManager[None]:
         """What is asked for inside goes to the other queue."""
 
-    def join(self) -> None:
-        """What is asked for later waits for what was asked for beside."""
+    def join_asynchronous(self) -> None:
+        """What is asked for later waits for the asynchronous work."""
 
-    def finish_beside(self) -> None:
-        """Wait until all that was asked for beside is done."""
+    def finish_asynchronous(self) -> None:
+        """Wait until all asynchronous work is done."""
 
 
-class Pair:
+class DualArray:
     """An array of the device and, when it is looked at, its copy on the host."""
 
     def __init__(self, device: Device, values: Any):
         """`values`: an array of the host or of the device."""
-        self._device, self._there = device, device.array(values) if isinstance(values, np.ndarray) else values
-        self.dtype = self._there.dtype
-        self.nbytes = int(np.prod(self._there.shape)) * np.dtype(self.dtype).itemsize
+        self._device, self._values = device, device.array(values) if isinstance(values, np.ndarray) else values
+        self.dtype = self._values.dtype
+        self.nbytes = int(np.prod(self._values.shape)) * np.dtype(self.dtype).itemsize
         self._host: np.ndarray | None = None
 
     @property
-    def there(self) -> Any:
+    def device(self) -> Any:
         """The device's array, for a kernel that may write into it."""
         self._host = None
-        return self._there
+        return self._values
 
     @property
     def read(self) -> Any:
         """The device's array, for kernels that do not write into it."""
-        return self._there
+        return self._values
 
-    def here(self) -> np.ndarray:
+    def host(self) -> np.ndarray:
         """The values on the host. Who changes them calls `changed`."""
         if self._host is None:
-            self._host = self._device.get(self._there)
+            self._host = self._device.download(self._values)
         return self._host
 
     def changed(self) -> None:
         """The values on the host have been changed."""
-        self._device.put(self._there, self.here())
+        self._device.upload(self._values, self.host())
 
 
 class Columns(MutableMapping[str, np.ndarray]):
-    """Arrays by name, each a `Pair`: `columns[name]` are its values on the host. Who changes them in place calls
+    """Arrays by name, each a `DualArray`: `columns[name]` are its values on the host. Who changes them in place calls
     `changed`."""
 
     def __init__(self, device: Device, arrays: Mapping[str, np.ndarray]):
         self.device = device
-        self._pairs: dict[str, Pair] = {}
+        self._pairs: dict[str, DualArray] = {}
         self.update(arrays)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return self._pairs[name].here()
+        return self._pairs[name].host()
 
     def __setitem__(self, name: str, host: np.ndarray) -> None:
-        self._pairs[name] = Pair(self.device, np.ascontiguousarray(host))
+        self._pairs[name] = DualArray(self.device, np.ascontiguousarray(host))
 
     def __delitem__(self, name: str) -> None:
         del self._pairs[name]
@@ -144,11 +145,11 @@ class Columns(MutableMapping[str, np.ndarray]):
 
     def write(self, *names: str) -> list[Any]:
         """The device's arrays, for kernels that may write into them."""
-        return [self._pairs[name].there for name in names]
+        return [self._pairs[name].device for name in names]
 
-    def adopt(self, name: str, there: Any) -> None:
+    def adopt(self, name: str, array: Any) -> None:
         """From now on an array of the device holds the values."""
-        self._pairs[name] = Pair(self.device, there)
+        self._pairs[name] = DualArray(self.device, array)
 
     def changed(self, *names: str) -> None:
         """The values on the host have been changed."""
