@@ -127,6 +127,7 @@ class Module:
     folded: Mapping[str, tuple[Source, ast.FunctionDef]]
     real: str
     written: dict[tuple, Function] = field(default_factory=dict)
+    loops: int = 0
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
         """The function for such arguments, written at its first call."""
@@ -136,6 +137,11 @@ class Module:
             self.written[key] = Writer(self, *self.folded[name]).function(f"{name}.{copies}", types)
         return self.written[key]
 
+    def loop(self) -> str:
+        """The mark of a loop that is to become one of vectors: its steps are not written out, however few."""
+        self.loops += 1
+        return f"!{self.loops}"
+
     def text(self) -> str:
         """The whole module."""
         sizes = ("double", "f64"), ("float", "f32")
@@ -144,7 +150,9 @@ class Module:
             f"declare {kind} @llvm.{word}.{size}({', '.join([kind] * count)})" for kind, size in sizes for word, count in words
         ]
         declared += ["declare i64 @llvm.abs.i64(i64, i1)", "declare noalias ptr @malloc(i64)", "declare void @free(ptr)"]
-        return "\n".join([*declared, "", *(function.text for function in self.written.values())])
+        marks = [f"!{k} = distinct !{{!{k}, !0}}" for k in range(1, self.loops + 1)]
+        marks = ['!0 = !{!"llvm.loop.unroll.disable"}', *marks] if marks else []
+        return "\n".join([*declared, "", *(function.text for function in self.written.values()), *marks, ""])
 
 
 def module_of(
@@ -422,7 +430,8 @@ class Writer:
         self.go(next_)
         self.start(next_)
         self.line(f"{following} = add nsw i64 {i}, {step}")
-        self.go(head)
+        mark = f", !llvm.loop {self.module.loop()}" if self.source.kind == "row" else ""
+        self.line(f"br label %{head}{mark}")
         self.start(after)
 
     # ---- expressions -------------------------------------------------------------------------------------------------
