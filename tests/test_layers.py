@@ -24,7 +24,6 @@ DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"kernels": "distfsi.device.markers", "mesh": "distfsi.device.seam"}
 
 ONLY_IN = {
-    "numba": "device",
     "llvmlite": "device",
     "cupy": "device",
     "mpi4py": "mesh",
@@ -86,7 +85,7 @@ def test_a_file_imports_only_from_the_layers_below(path):
         ("mesh", "distfsi.errors.InputError", True),
         ("mesh", "mpi4py.MPI", True),
         ("parts", "mpi4py.MPI", False),
-        ("kernels", "numba", False),
+        ("kernels", "llvmlite", False),
         ("physics", "math.sqrt", True),
         ("physics", "numpy", False),
         ("physics", "distfsi.errors", False),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,8 +63,3 @@ class Kernel:
     def _named(self, arguments: Sequence[object]) -> dict[str, object]:
         _, _, *names = inspect.signature(self.driver).parameters
         return dict(zip(names, arguments, strict=True))
-
-
-def file_name(name: str, text: str) -> str:
-    """The name under which what is compiled from a text is kept."""
-    return f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"

@@ -33,6 +33,10 @@ ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 BITWISE = {ast.BitAnd: "and", ast.BitOr: "or", ast.LShift: "shl", ast.RShift: "ashr"}
 COMPARISONS = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 LOOPS = (ast.For, ast.While)
+DECLARED = [f"declare double @llvm.{word}.f64(double)" for word in ("sqrt", "log", "fabs", "floor")]
+DECLARED += [f"declare float @llvm.{word}.f32(float)" for word in ("sqrt", "log", "fabs", "floor")]
+DECLARED += ["declare double @llvm.pow.f64(double, double)", "declare float @llvm.pow.f32(float, float)"]
+DECLARED += ["declare i64 @llvm.abs.i64(i64, i1)", "declare noalias ptr @malloc(i64)", "declare void @free(ptr)"]
 
 
 @dataclass(frozen=True)
@@ -144,15 +148,9 @@ class Module:
 
     def text(self) -> str:
         """The whole module."""
-        sizes = ("double", "f64"), ("float", "f32")
-        words = [(word, 1) for word in ("sqrt", "log", "fabs", "floor")] + [("pow", 2)]
-        declared = [
-            f"declare {kind} @llvm.{word}.{size}({', '.join([kind] * count)})" for kind, size in sizes for word, count in words
-        ]
-        declared += ["declare i64 @llvm.abs.i64(i64, i1)", "declare noalias ptr @malloc(i64)", "declare void @free(ptr)"]
         marks = [f"!{k} = distinct !{{!{k}, !0}}" for k in range(1, self.loops + 1)]
         marks = ['!0 = !{!"llvm.loop.unroll.disable"}', *marks] if marks else []
-        return "\n".join([*declared, "", *(function.text for function in self.written.values()), *marks, ""])
+        return "\n".join([*DECLARED, "", *(function.text for function in self.written.values()), *marks, ""])
 
 
 def module_of(
@@ -548,7 +546,8 @@ class Writer:
     def selected(self, condition: str, a: Value, b: Value) -> Value:
         """One of two values of one type that are both computed."""
         triples = zip(leaf_types(a.type), a.leaves, b.leaves, strict=True)
-        return Value(a.type, tuple(self.new(f"select i1 {condition}, {leaf} {x}, {leaf} {y}") for leaf, x, y in triples))
+        leaves = [self.new(f"select i1 {condition}, {leaf} {x}, {leaf} {y}") for leaf, x, y in triples]
+        return Value(a.type, tuple(leaves))
 
     def value_of_attribute(self, node: ast.Attribute) -> Value:
         lengths = self.value(node.value).leaves[1:]

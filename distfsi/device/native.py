@@ -7,12 +7,9 @@ whether they have the types that the text is made for, and releases the GIL whil
 from __future__ import annotations
 
 import ctypes
-import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -27,6 +24,7 @@ HEAD = object.__basicsize__  # of each object of Python, in bytes
 DATA, AXES, LENGTHS, TYPE, FLAGS = HEAD, HEAD + 8, HEAD + 16, HEAD + 40, HEAD + 48
 TYPE_NUMBER = HEAD + 12
 CONTIGUOUS = 1
+CODES = np.typecodes["AllInteger"] + np.typecodes["Float"] + "?"  # of numpy's types; several may be alike
 PYTHON = {  # what the entry calls, with the types of its value and arguments
     "PyEval_SaveThread": ("ptr", ()),
     "PyEval_RestoreThread": ("void", ("ptr",)),
@@ -57,7 +55,7 @@ class Entry:
     def text(self) -> str:
         """The function and what it needs declared."""
         objects = [f"%o{k}" for k in range(len(self.types))]
-        operands = [leaf for kind, given in zip(self.types, objects, strict=True) for leaf in self.unpacked(kind, given)]
+        operands = self.unpacked_all(self.types, objects)
         self.go_on_if(self.new(f"icmp eq ptr {self.new('call ptr @PyErr_Occurred()')}, null"))
         state = self.new("call ptr @PyEval_SaveThread()")
         result, kind = "", packed_type(self.driver.returns)
@@ -97,13 +95,16 @@ class Entry:
         """What stands at an offset in bytes of an object."""
         return self.new(f"load {kind}, ptr {self.new(f'getelementptr i8, ptr {given}, i64 {offset}')}")
 
+    def unpacked_all(self, kinds: Sequence[Type], given: Sequence[str]) -> list[str]:
+        return [leaf for kind, one in zip(kinds, given, strict=True) for leaf in self.unpacked(kind, one)]
+
     def unpacked(self, kind: Type, given: str) -> list[str]:
         """The leaves of an object, with their types."""
         if isinstance(kind, tuple):
             size = self.new(f"call i64 @PyTuple_Size(ptr {given})")
             self.go_on_if(self.new(f"icmp eq i64 {size}, {len(kind)}"))
             parts = [self.new(f"call ptr @PyTuple_GetItem(ptr {given}, i64 {k})") for k in range(len(kind))]
-            return [leaf for part, part_kind in zip(parts, kind, strict=True) for leaf in self.unpacked(part_kind, part)]
+            return self.unpacked_all(kind, parts)
         if isinstance(kind, Array):
             return self.unpacked_array(kind, given)
         if kind == INTEGER:
@@ -115,10 +116,10 @@ class Entry:
         return [f"double {value}" if kind == "double" else f"float {self.new(f'fptrunc double {value} to float')}"]
 
     def unpacked_array(self, kind: Array, given: str) -> list[str]:
-        self.go_on_if(self.new(f"icmp eq ptr {self.member('ptr', given, 8)}, @python_array_type"))
+        self.go_on_if(self.new(f"icmp eq ptr {self.member('ptr', given, HEAD - 8)}, @python_array_type"))
         number = self.member("i32", self.member("ptr", given, TYPE), TYPE_NUMBER)
-        same = "false"
-        for alike in sorted({np.dtype(code).num for code in np.typecodes["All"] if np.dtype(code).name == kind.element}):
+        same, numbers = "false", {np.dtype(code).num for code in CODES if np.dtype(code).name == kind.element}
+        for alike in sorted(numbers):
             same = self.new(f"or i1 {same}, {self.new(f'icmp eq i32 {number}, {alike}')}")
         axes = self.new(f"icmp eq i32 {self.member('i32', given, AXES)}, {kind.axes}")
         flag = self.new(f"and i32 {self.member('i32', given, FLAGS)}, {CONTIGUOUS}")
@@ -130,7 +131,7 @@ class Entry:
             *(f"i64 {self.member('i64', lengths, 8 * axis)}" for axis in range(kind.axes)),
         ]
 
-    def packed(self, kind: Type | None, leaves) -> str:
+    def packed(self, kind: Type | None, leaves: Iterator[str]) -> str:
         """The object of Python for a value."""
         if kind is None:
             self.line("call void @Py_IncRef(ptr @python_none)")
@@ -149,44 +150,35 @@ class Entry:
         return self.new(f"call ptr @PyFloat_FromDouble(double {double})")
 
 
-@dataclass
 class Compiler:
-    """LLVM for this machine's cores, and what has been loaded."""
+    """LLVM for the cores of this machine, and what it has made or loaded in this process.
 
-    def __post_init__(self):
+    made    drivers compiled; those found on disk do not count
+    listener  told of `made` when another one is about to be compiled
+    """
+
+    def __init__(self):
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()
-        self.cpu, self.features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-        self.machine = self._machine()
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), self._machine())
+        cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+        target = llvm.Target.from_triple(llvm.get_process_triple())
+        reloc = "static" if target.name.startswith("x86") else "default"
+        options = {"cpu": cpu, "features": features, "opt": 3, "reloc": reloc, "codemodel": "jitdefault", "jit": True}
+        self.identity = f"llvmlite {llvmlite.__version__} {cpu} {features}"  # what else machine code depends on
+        self.machine = target.create_target_machine(**options)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine(**options))
         for name in PYTHON:
             llvm.add_symbol(name, ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value)
         for name, value in OBJECTS.items():
             llvm.add_symbol(name, id(value))
-        self._loaded: dict[str, int] = {}
-
-    def _machine(self) -> llvm.TargetMachine:
-        target = llvm.Target.from_triple(llvm.get_process_triple())
-        reloc = "static" if target.name.startswith("x86") else "default"
-        return target.create_target_machine(
-            cpu=self.cpu, features=self.features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True
-        )
-
-    @property
-    def identity(self) -> str:
-        """What machine code depends on beside the text."""
-        return f"{llvmlite.__version__} {self.cpu} {self.features}"
-
-    def machine_code(self, text: str) -> bytes:
-        """An object file. Optimised as strictly as C: nothing reassociates or contracts arithmetic."""
-        module = self.optimised(text)
-        return self.machine.emit_object(module)
+        self._addresses: dict[str, int] = {}
+        self.made = 0
+        self.listener: Callable[[int], None] = lambda made: None
 
     def optimised(self, text: str) -> llvm.ModuleRef:
-        """The module of a text after all passes."""
+        """A module after all passes."""
         module = llvm.parse_assembly(text)
-        module.data_layout = str(self.machine.target_data)
-        module.triple = llvm.get_process_triple()
+        module.triple, module.data_layout = self.machine.triple, str(self.machine.target_data)
         module.verify()
         options = llvm.create_pipeline_tuning_options(speed_level=3)
         options.loop_vectorization, options.slp_vectorization = True, False
@@ -194,13 +186,20 @@ class Compiler:
         builder.getModulePassManager().run(module, builder)
         return module
 
-    def load(self, name: str, path: Path) -> int:
-        """The address of the function `name` in an object file."""
-        if name not in self._loaded:
+    def address(self, name: str, text: str) -> int:
+        """Where the function `name` of a module is; its machine code is kept on disk under that name."""
+        if name not in self._addresses:
+            path = cache_directory() / f"{name}.o"
+            if not path.exists():
+                with locked(path):
+                    if not path.exists():
+                        self.made += 1
+                        self.listener(self.made)
+                        write_whole(path, self.machine.emit_object(self.optimised(text)))
             self._engine.add_object_file(llvm.ObjectFileRef.from_path(str(path)))
             self._engine.finalize_object()
-            self._loaded[name] = self._engine.get_function_address(name)
-        return self._loaded[name]
+            self._addresses[name] = self._engine.get_function_address(name)
+        return self._addresses[name]
 
 
 @cache
@@ -210,50 +209,39 @@ def compiler() -> Compiler:
 
 
 class Native:
-    """A driver, specialised for a scene; machine code is made for each list of types that it is called with.
+    """A driver, specialised for a scene, for Python to call: compiled for each list of types that it is called with.
 
-    `kept`: how many of them were found on disk, `made`: how many were compiled.
+    A number is made one of the type that its parameter has, if it can be: an integer may stand for a real.
     """
 
     def __init__(self, driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
-        self.kept = self.made = 0
-        self._functions: dict[tuple[Type, ...], Callable] = {}
+        self._entries: dict[tuple[Type, ...], Callable] = {}
         self._latest: Callable = lambda *arguments: NotImplemented
         self._lock = threading.Lock()
 
     def __call__(self, *arguments):
+        """Raises NotInSubset, and TypeError for what no kernel takes."""
         result = self._latest(*arguments)
-        return self._call_another(arguments) if result is NotImplemented else result
+        return self._call_for_types(arguments) if result is NotImplemented else result
 
-    def _call_another(self, arguments: Sequence[object]):
+    def _call_for_types(self, arguments: Sequence[object]):
         types = tuple(map(type_of, arguments))
         with self._lock:
-            if types not in self._functions:
-                self._functions[types] = self._function(types)
-            self._latest = self._functions[types]
-        return self._latest(*arguments)
+            if types not in self._entries:
+                self._entries[types] = self._entry(types)
+            self._latest = self._entries[types]
+        return self._entries[types](*arguments)
 
-    def text(self, types: tuple[Type, ...]) -> tuple[str, str]:
-        """The name and the text of the module for arguments of such types."""
+    def module(self, types: tuple[Type, ...]) -> tuple[str, str]:
+        """The name of the entry for arguments of such types, and the text of its module."""
         module, driver = module_of(self.driver, self.constants, self.bindings, self.real, types)
-        body = module.text()
-        entry = Entry("ENTRY", driver, types).text()
-        name = file_name(self.driver.__name__, "\n".join([compiler().identity, body, entry]))
-        return name, body + entry.replace("@ENTRY(", f"@{name}(", 1)
+        text = module.text() + Entry("ENTRY", driver, types).text()
+        name = file_name(self.driver.__name__, f"; {compiler().identity}\n{text}")
+        return name, text.replace("@ENTRY(", f"@{name}(", 1)
 
-    def _function(self, types: tuple[Type, ...]) -> Callable:
-        name, text = self.text(types)
-        path = cache_directory() / f"{name}.o"
-        if path.exists():
-            self.kept += 1
-        else:
-            with locked(path):
-                if path.exists():
-                    self.kept += 1
-                else:
-                    self.made += 1
-                    if os.environ.get("KEEP"): path.parent.mkdir(parents=True, exist_ok=True); path.with_suffix(".ll").write_text(text)
-                    write_whole(path, compiler().machine_code(text))
+    def _entry(self, types: tuple[Type, ...]) -> Callable:
         prototype = ctypes.PYFUNCTYPE(ctypes.py_object, *[ctypes.py_object] * len(types))
-        return prototype(compiler().load(name, path))
+        entry = prototype(compiler().address(*self.module(types)))
+        entry.compiler = compiler()  # which owns the machine code
+        return entry

@@ -6,11 +6,9 @@ bare stage kernel, timed in the same run. A complete bench is kept for `python -
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import platform
-import sys
 import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ import numpy as np
 
 from distfsi import __version__
 from distfsi.device.cpu import cache_directory
+from distfsi.device.native import compiler
 from distfsi.mesh.communicator import Communicator
 from distfsi.parts.accounts import Accounts
 from distfsi.parts.fluid import Fluid
@@ -195,9 +194,7 @@ def bench_smallest(work: Scene, communicator: Communicator, threads: int | None,
 
 def _forget_kernels() -> None:
     """The next build loads the compiled kernels from disk again."""
-    for name in [name for name in sys.modules if name.startswith("distfsi_kernels.")]:
-        del sys.modules[name]
-    gc.collect()
+    compiler.cache_clear()
 
 
 def main(communicator: Communicator, threads: int | None, only: str | None = None, seconds: float = 0.5) -> dict:
