@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from distfsi.device import cpu, emit
+from distfsi.device.fingerprint import fingerprint
 from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.llvm_text import REALS, module_of
 from distfsi.device.markers import driver, helper, load, row, store, workspace
@@ -586,6 +587,31 @@ def test_two_scenes_live_side_by_side():
     """A changed constant gives another module, never a stale one."""
     values = [cpu.build([scaled], {"GAMMA": gamma}).scaled(1.0) for gamma in (1.4, 1.5, 1.4)]
     assert values == [1.4, 1.5, 1.4]
+
+
+def test_a_text_made_before_is_found_without_folding(monkeypatch):
+    assert cpu.build([scaled], {"GAMMA": 1.25}).scaled(2.0) == 2.5
+    monkeypatch.setattr(Native, "module", None)
+    assert cpu.build([scaled], {"GAMMA": 1.25, "N": 3}).scaled(2.0) == 2.5
+
+
+def test_the_fingerprint_tells_all_that_a_text_depends_on(monkeypatch):
+    first, second = Bound(material, {"GAMMA": 3.0}), Bound(scaled, {"GAMMA": 5.0})
+    bindings = {"first_material": first, "second_material": second}
+    before = fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float64")
+    assert before == fingerprint(two_materials, {"GAMMA": 2.0, "N": 2}, bindings, "float64")  # neither is looked at
+    others = [
+        fingerprint(two_materials, {}, bindings | {"first_material": Bound(material, {"GAMMA": 4.0})}, "float64"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float32"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings | {"first_material": second}, "float64"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings | {"second_material": Bound(scaled)}, "float64"),
+    ]
+    monkeypatch.setitem(globals(), "scaled", cubed)  # which `material` calls
+    others.append(fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float64"))
+    plain_number = fingerprint(constants_are_folded, {}, {})
+    monkeypatch.setitem(globals(), "HALF", 0.25)
+    assert len({before, *others}) == 1 + len(others)
+    assert fingerprint(constants_are_folded, {}, {}) != plain_number
 
 
 PROGRAM = """

@@ -10,12 +10,14 @@ import ctypes
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 
 import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
 from distfsi.device.cache import cache_directory, file_name, locked, write_whole
+from distfsi.device.fingerprint import fingerprint
 from distfsi.device.fold import Bound
 from distfsi.device.llvm_text import BOOL, INTEGER, Array, Function, Type, leaf_types, module_of, packed_type, type_of
 
@@ -186,20 +188,29 @@ class Compiler:
         builder.getModulePassManager().run(module, builder)
         return module
 
-    def address(self, name: str, text: str) -> int:
-        """Where the function `name` of a module is; its machine code is kept on disk under that name."""
+    def knows(self, name: str) -> bool:
+        """Whether the function `name` is loaded or on disk."""
+        return name in self._addresses or _path(name).exists()
+
+    def compile(self, name: str, text: str) -> None:
+        """Put the machine code of a module on disk under the name of its entry, unless it is there."""
+        with locked(_path(name)):
+            if not self.knows(name):
+                self.made += 1
+                self.listener(self.made)
+                write_whole(_path(name), self.machine.emit_object(self.optimised(text)))
+
+    def address(self, name: str) -> int:
+        """Where the function `name` is, loaded from disk."""
         if name not in self._addresses:
-            path = cache_directory() / f"{name}.o"
-            if not path.exists():
-                with locked(path):
-                    if not path.exists():
-                        self.made += 1
-                        self.listener(self.made)
-                        write_whole(path, self.machine.emit_object(self.optimised(text)))
-            self._engine.add_object_file(llvm.ObjectFileRef.from_path(str(path)))
+            self._engine.add_object_file(llvm.ObjectFileRef.from_path(str(_path(name))))
             self._engine.finalize_object()
             self._addresses[name] = self._engine.get_function_address(name)
         return self._addresses[name]
+
+
+def _path(name: str) -> Path:
+    return cache_directory() / f"{name}.o"
 
 
 @cache
@@ -240,8 +251,19 @@ class Native:
         name = file_name(self.driver.__name__, f"; {compiler().identity}\n{text}")
         return name, text.replace("@ENTRY(", f"@{name}(", 1)
 
+    def _compiled(self, types: tuple[Type, ...]) -> str:
+        """The name of the entry for arguments of such types, compiled."""
+        key = fingerprint(self.driver, self.constants, self.bindings, self.real, types, compiler().identity)
+        known = cache_directory() / f"{self.driver.__name__}_{key}.name"
+        name = known.read_text() if known.exists() else ""
+        if not (name and compiler().knows(name)):
+            name, text = self.module(types)
+            compiler().compile(name, text)
+            write_whole(known, name.encode())
+        return name
+
     def _entry(self, types: tuple[Type, ...]) -> Callable:
         prototype = ctypes.PYFUNCTYPE(ctypes.py_object, *[ctypes.py_object] * len(types))
-        entry = prototype(compiler().address(*self.module(types)))
+        entry = prototype(compiler().address(self._compiled(types)))
         entry.compiler = compiler()  # which owns the machine code
         return entry
