@@ -11,7 +11,8 @@ import pytest
 from distfsi.device import cpu, emit
 from distfsi.device.fingerprint import fingerprint
 from distfsi.device.fold import Bound, NotInSubset
-from distfsi.device.llvm_text import REALS, module_of
+from distfsi.device.llvm_text import module_of
+from distfsi.device.llvm_types import REALS
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.device.native import Native
 from distfsi.physics.subset import static_range

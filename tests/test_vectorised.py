@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 
-from distfsi.device.llvm_text import module_of, type_of
+from distfsi.device.llvm_text import module_of
+from distfsi.device.llvm_types import type_of
 from distfsi.device.native import compiler
 from distfsi.kernels import cut_forces, fluid, peaks, push, wall_distance
 from fluids import model_of

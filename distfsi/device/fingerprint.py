@@ -7,6 +7,7 @@ import marshal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from pathlib import Path
 from types import CodeType
 
 from distfsi.device.fold import Bound
@@ -20,7 +21,7 @@ def fingerprint(
     """A hash of the functions that a driver can reach, as Python has compiled them, of the constants and formulas that
     a scene gives to the names in them, and of `others`."""
     seen: set[tuple] = set()
-    told = hashlib.sha256(repr((sys.version, others)).encode())
+    told = hashlib.sha256(_writers() + repr(others).encode())
 
     def tell(function: Callable, scope: Mapping[str, object], scope_name: str) -> None:
         key = function, scope_name
@@ -44,6 +45,12 @@ def fingerprint(
 
     tell(driver, {}, "")
     return told.hexdigest()[:20]
+
+
+@cache
+def _writers() -> bytes:
+    """What makes texts of functions: Python, and this folder."""
+    return sys.version.encode() + b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
 
 
 @cache

@@ -19,7 +19,8 @@ import numpy as np
 from distfsi.device.cache import cache_directory, file_name, locked, write_whole
 from distfsi.device.fingerprint import fingerprint
 from distfsi.device.fold import Bound
-from distfsi.device.llvm_text import BOOL, INTEGER, Array, Function, Type, leaf_types, module_of, packed_type, type_of
+from distfsi.device.llvm_text import module_of
+from distfsi.device.llvm_types import BOOL, INTEGER, Array, Function, Type, leaf_types, packed_type, type_of
 
 HEAD = object.__basicsize__  # of each object of Python, in bytes
 # Where an array of numpy keeps its address, axes, lengths, type and flags, and a type its number: numpy's ABI.
