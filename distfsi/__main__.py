@@ -43,7 +43,8 @@ def parser() -> argparse.ArgumentParser:
     commands = main.add_subparsers(dest="command", required=True, metavar="{" + ",".join(COMMANDS) + "}")
     run = commands.add_parser("run", help="run a scene (the command may be left out)")
     check = commands.add_parser("check", help="check a scene; tell what it costs and what it could do without")
-    for command in (run, check):
+    compiling = commands.add_parser("compile", help="compile what a scene needs, so that a run of it starts at once")
+    for command in (run, check, compiling):
         command.add_argument("input", help="the scene, a TOML file")
         _add_overrides(command)
     run.add_argument("--threads", type=int, help="threads per rank (default: cores shared by the node's ranks)")
@@ -140,6 +141,19 @@ def run(arguments: argparse.Namespace) -> None:
         run(scene, communicator, arguments.threads, arguments.restart, *gpus)
 
 
+def compile_scene(arguments: argparse.Namespace) -> None:
+    """Compile a scene's kernels."""
+    from distfsi.device.cache import cache_directory
+    from distfsi.run import compile_kernels
+    from distfsi.scene import load
+
+    communicator = _start_ranks()
+    with _telling_once(communicator):
+        made = compile_kernels(_load_once(load, arguments, communicator), communicator)
+        if communicator.rank == 0:
+            print(f"{made} kernels compiled; all are in {cache_directory()}")
+
+
 def check(arguments: argparse.Namespace) -> None:
     """Print what a scene costs."""
     from distfsi.scene import load
@@ -208,6 +222,7 @@ def doctor(arguments: argparse.Namespace) -> None:
 
 COMMANDS = {
     "run": run,
+    "compile": compile_scene,
     "check": check,
     "schema": schema,
     "plot": plot,

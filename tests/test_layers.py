@@ -2,6 +2,7 @@
 
 import ast
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -125,3 +126,10 @@ def test_the_top_of_the_repository_holds_what_the_architecture_says():
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
     present = {name.split("/")[0] for name in listed if (ROOT / name).exists()}
     assert present <= TOP_LEVEL
+
+
+def test_a_run_starts_without_what_it_may_not_need():
+    """Each takes a third of a second: pictures are drawn at the end, and few scenes need an equation solved."""
+    program = "import sys, distfsi.run; print(*{'matplotlib', 'scipy', 'vtk', 'cupy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, cwd=ROOT)
+    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
