@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from distfsi.__main__ import main
-from distfsi.commands.check import report
+from distfsi.commands.line import main
 from distfsi.errors import InputError
+from distfsi.resources.report import report
 from distfsi.scene import load
 from launch import ROOT
 

@@ -12,8 +12,9 @@ PACKAGE = ROOT / "distfsi"
 # From the top down. A folder imports only from those further down; those of one row do not know each other.
 LAYERS = (
     {"__main__"},
-    {"study"},
     {"commands"},
+    {"study"},
+    {"resources"},
     {"run"},
     {"simulation", "direct"},
     {"diagnostics"},
@@ -42,7 +43,7 @@ ONLY_IN = {
 
 TOP_LEVEL = {
     "pyproject.toml", "distfsi", "launch", "tests", "inputs", "README.md", "ARCHITECTURE.md", "docs", ".ci", "LICENSE",
-    "CHANGELOG.md", ".gitignore", ".pre-commit-config.yaml",
+    "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", ".gitignore", ".pre-commit-config.yaml",
 }  # fmt: skip
 
 

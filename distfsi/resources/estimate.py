@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from scipy import ndimage, optimize
 
-from distfsi.commands.works import SMOOTHING
 from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
 from distfsi.mesh.blocks import Blocks
+from distfsi.resources.works import SMOOTHING
 from distfsi.scene.description import IdealGas, Scene, StiffenedGas
 from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_steps

@@ -12,10 +12,10 @@ import time as clock
 
 import numpy as np
 
-from distfsi.commands.bench import Stopwatch, start, stir
-from distfsi.commands.works import FLUIDS
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.communicator import Communicator
+from distfsi.resources.bench import Stopwatch, start, stir
+from distfsi.resources.works import FLUIDS
 from distfsi.scene.description import Scene
 
 WORK = "shock_bubble_2d"
