@@ -13,12 +13,13 @@ import numpy as np
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study import fitted_cylinder, fitted_liftoff
 from distfsi.study.references import LIFTOFF
-from distfsi.study.tracks import Measure, Tracks, follow, write_tracks
+from distfsi.study.tracks import Measure, Tracks, record_tracks, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "liftoff.toml"
+INPUT = shipped_inputs() / "liftoff.toml"
 DIRECTORY = Path("out/study_liftoff")
 CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many particles
 STEPS_BETWEEN_SAMPLES = 5
@@ -59,7 +60,7 @@ def run(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tra
     size = [f"domain.cells=[{5 * cells},{cells}]", f"solid.bodies.cylinder.spacing={0.1 / cells!r}"]
     scene = load(INPUT, [*size, f'output.directory="{DIRECTORY / str(cells)}"', *overrides])
     times = [instant.time for instant in LIFTOFF]
-    return follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
+    return record_tracks(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
 
 
 def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tracks:
@@ -90,7 +91,7 @@ def throw(communicator: Communicator, around: Surroundings, cells: int, override
         f"solid.bodies.cylinder.spacing={0.5 * h!r}",
         f'output.directory="{DIRECTORY / f"thrown_{cells}"}"',
     ]
-    return follow(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
+    return record_tracks(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
 
 
 def flight(around: Surroundings, end: float, cells: int = FITTED_CELLS) -> Tracks:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -17,11 +16,12 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
 from distfsi.scene.description import Box, HalfSpace, Performance, Scene, Shape, StiffenedGas
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.exact import PureState, exact_riemann
 from distfsi.study.radial import Rings, cylindrical_explosion
 
-INPUTS = Path(__file__).parents[2] / "inputs"
+INPUTS = shipped_inputs()
 PERIODIC = ("periodic", "periodic")
 QUANTITIES = ("density", "velocity", "pressure")
 

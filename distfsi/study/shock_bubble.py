@@ -17,11 +17,12 @@ from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictu
 from distfsi.output.fields import read_cells, series
 from distfsi.scene import load
 from distfsi.scene.description import Scene
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.references import SHOCK_BUBBLE
-from distfsi.study.tracks import Line, Measure, Tracks, crossing, follow, velocity, write_tracks
+from distfsi.study.tracks import Line, Measure, Tracks, crossing, record_tracks, velocity, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "shock_bubble.toml"
+INPUT = shipped_inputs() / "shock_bubble.toml"
 DIRECTORY = Path("out/study_shock_bubble")
 GASES = {
     "pure": (),
@@ -123,7 +124,8 @@ def run_gas(communicator: Communicator, gas: str, overrides: Sequence[str]) -> t
     scene = load(INPUT, settings)
     start = arrival_of(scene)
     pictures = [start + time / MICROSECONDS for time in MAP_TIMES + SCHLIEREN_TIMES]
-    return scene, in_microseconds(follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, pictures), scene)
+    tracks = record_tracks(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, pictures)
+    return scene, in_microseconds(tracks, scene)
 
 
 # ---- what is shown ---------------------------------------------------------------------------------------------------

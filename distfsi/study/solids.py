@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,9 +12,10 @@ from scipy.spatial import cKDTree
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.scene.description import Box, Cylinder, Tube
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 
-INPUTS = Path(__file__).parents[2] / "inputs"
+INPUTS = shipped_inputs()
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,11 @@ from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.run import run
 from distfsi.scene import load
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.study.references import STEEL_TUBE, STEEL_TUBE_JOHNSON_COOK, STEEL_TUBE_PLASTIC, TubeStrength
 
 DIRECTORY = Path("out/study_steel_tube")
-INPUT = Path(__file__).parents[2] / "inputs" / "steel_tube.toml"
+INPUT = shipped_inputs() / "steel_tube.toml"
 WIDE = (  # room for 60 us; eight particles across the wall; with strength it has begun to neck by 40 us
     "solid.form=total_lagrangian",
     "domain.upper=[0.14,0.14]",

@@ -14,11 +14,12 @@ from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictu
 from distfsi.output.fields import read_cells, series
 from distfsi.scene import load
 from distfsi.scene.description import Scene
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.references import UNDEX_2D, RadialProfile
-from distfsi.study.tracks import Line, Measure, Tracks, crossing, follow, write_tracks
+from distfsi.study.tracks import Line, Measure, Tracks, crossing, record_tracks, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "undex_2d.toml"
+INPUT = shipped_inputs() / "undex_2d.toml"
 DIRECTORY = Path("out/study_undex_2d")
 RADII = (0.5, 0.4)  # the paper does not tell which [m]
 DIRECTIONS = {"axis": (1.0, 0.0), "diagonal": (sqrt(0.5), sqrt(0.5))}
@@ -67,7 +68,7 @@ def explode(communicator: Communicator, charge: float, overrides: Sequence[str])
     def measure_of(simulation: Simulation) -> Measure:
         return _measure(simulation, profiles)
 
-    return Explosion(scene, follow(scene, communicator, measure_of, 1, PICTURE_TIMES), profiles)
+    return Explosion(scene, record_tracks(scene, communicator, measure_of, 1, PICTURE_TIMES), profiles)
 
 
 def _measure(simulation: Simulation, profiles: dict[str, dict[str, np.ndarray]]) -> Measure:
