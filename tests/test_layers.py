@@ -23,7 +23,7 @@ LAYERS = (
     {"mesh", "device", "output", "scene"},
     {"laws"},
     {"formulas"},
-    {"errors", "__init__"},
+    {"errors", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}

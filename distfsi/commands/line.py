@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     commands = main.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name in COMMANDS:
         module = import_module(f"distfsi.commands.{name}")
-        summary, _, rest = module.__doc__.partition("\n")
+        summary, _, rest = str(module.__doc__).partition("\n")
         one = commands.add_parser(name, help=summary, description=summary, epilog=rest, formatter_class=as_written)
         module.add_arguments(one)
         one.set_defaults(execute=module.execute)

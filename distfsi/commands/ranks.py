@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from distfsi.errors import DistfsiError, InputError
+from distfsi.narrowing import present
 
 if TYPE_CHECKING:
     from distfsi.mesh.communicator import Communicator
@@ -28,7 +29,8 @@ def load_once(path: str, overrides: Sequence[str], communicator: Communicator) -
     """Collective. The scene, read by rank 0 alone; its faults are raised on all ranks as InputError."""
     from distfsi.scene import load
 
-    scene, faults = None, None
+    scene: Scene | None = None
+    faults: list[str] = []
     if communicator.rank == 0:
         try:
             scene = load(path, overrides)
@@ -37,7 +39,7 @@ def load_once(path: str, overrides: Sequence[str], communicator: Communicator) -
     scene, faults = communicator.broadcast((scene, faults))
     if faults:
         raise InputError(faults)
-    return scene
+    return present(scene)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from distfsi.device.cpu import cache_directory
 from distfsi.diagnostics.budget import Budget
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.resources.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLID_SIZES, SOLIDS
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
@@ -59,7 +61,7 @@ def time_loop(simulation: Simulation, seconds: float) -> tuple[float, float]:
     first = clock.perf_counter() - started
     started = clock.perf_counter()
     simulation.step()
-    steps = communicator.broadcast(max(2, int(seconds / (clock.perf_counter() - started))))
+    steps: int = communicator.broadcast(max(2, int(seconds / (clock.perf_counter() - started))))
     best = np.inf
     for _ in range(REPEATS):
         communicator.barrier()
@@ -83,7 +85,7 @@ def time_history(simulation: Simulation) -> float:
 
 def time_kernel(simulation: Simulation) -> float:
     """Best time [s] of one bare stage kernel on this rank's tiles."""
-    fluid, best = simulation.fluid, np.inf
+    fluid, best = present(simulation.fluid), np.inf
     tiles = np.arange(len(fluid.tiles))
     for _ in range(REPEATS * 3):
         simulation.communicator.barrier()
@@ -105,10 +107,10 @@ def stir(fluid: Fluid) -> None:
 class Stopwatch:
     """Calls a function and adds up the time it takes [s]."""
 
-    function: Callable
+    function: Callable[..., Any]
     seconds: float = 0.0
 
-    def __call__(self, *arguments):
+    def __call__(self, *arguments: Any) -> Any:
         started = clock.perf_counter()
         result = self.function(*arguments)
         self.seconds += clock.perf_counter() - started
@@ -133,7 +135,7 @@ def time_parts(simulation: Simulation) -> Result:
     around it. Of the fastest step of several."""
     gather = simulation.communicator.allgather
     wall, step = min((time_coupled_step(simulation) for _ in range(REPEATS)), key=lambda times: times[1])
-    cells, band = int(np.prod(simulation.scene.domain.cells)), int(simulation.coupling.workload().sum())
+    cells, band = int(np.prod(simulation.scene.domain.cells)), int(present(simulation.coupling).workload().sum())
     return {
         "cells": cells,
         "band_cells": sum(gather(band)),
@@ -146,16 +148,17 @@ def time_parts(simulation: Simulation) -> Result:
 def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
     """Speed of the time loop of one fluid, none of it at rest."""
     simulation = start(work, communicator, threads)
-    stir(simulation.fluid)
+    fluid = present(simulation.fluid)
+    stir(fluid)
     first, step = time_loop(simulation, seconds)
     cells = int(np.prod(work.domain.cells))
     kernel = time_kernel(simulation)
-    memory = communicator.allgather(simulation.fluid.memory())
+    memory = communicator.allgather(fluid.memory())
     return {
         "cells": cells,
-        "cell_stages_per_second": len(simulation.fluid.stages) * cells / step,
+        "cell_stages_per_second": len(fluid.stages) * cells / step,
         "kernel_cell_stages_per_second": cells / kernel,
-        "share_of_kernel": len(simulation.fluid.stages) * kernel / step,
+        "share_of_kernel": len(fluid.stages) * kernel / step,
         "history_row_seconds": time_history(simulation),
         "bytes_per_cell": sum(memory) / cells,
         "first_step_seconds": first,
@@ -165,10 +168,10 @@ def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, se
 def bench_solid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
     """Speed of the time loop of one solid, with a fluid around it or without; and what the wall between them costs."""
     simulation = start(work, communicator, threads)
-    particles = sum(communicator.allgather(len(simulation.solid.columns["id"])))
+    particles = sum(communicator.allgather(len(present(simulation.solid).columns["id"])))
     first, step = time_loop(simulation, seconds)
     if simulation.coupling:
-        stir(simulation.fluid)
+        stir(present(simulation.fluid))
     coupled = time_parts(simulation) if simulation.coupling else {}
     return coupled | {
         "particles": particles,
@@ -200,12 +203,14 @@ def _forget_kernels() -> None:
     gc.collect()
 
 
-def main(communicator: Communicator, threads: int | None, only: str | None = None, seconds: float = 0.5) -> dict:
+def main(
+    communicator: Communicator, threads: int | None, only: str | None = None, seconds: float = 0.5
+) -> dict[str, Any]:
     """Run the benchmarks (those whose name holds `only`), print them as JSON on rank 0, and keep a complete bench.
 
     SOLID_SIZES are for those who ask for them: they take much memory.
     """
-    result = {
+    result: dict[str, Any] = {
         "distfsi": __version__,
         "machine": platform.processor() or platform.machine(),
         "ranks": communicator.size,
@@ -227,7 +232,7 @@ def main(communicator: Communicator, threads: int | None, only: str | None = Non
     return result
 
 
-def kept_bench() -> dict | None:
+def kept_bench() -> dict[str, Any] | None:
     """The last complete bench of this machine by this version, if there is one."""
     try:
         result = json.loads(_place().read_text())
@@ -236,7 +241,7 @@ def kept_bench() -> dict | None:
     return result if result.get("distfsi") == __version__ else None
 
 
-def _keep(result: dict) -> None:
+def _keep(result: dict[str, Any]) -> None:
     _place().parent.mkdir(parents=True, exist_ok=True)
     temporary = _place().with_suffix(".tmp")
     temporary.write_text(json.dumps(result))

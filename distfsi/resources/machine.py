@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import shutil
 from pathlib import Path
+from typing import Any
 
 from distfsi import __version__
 from distfsi.device import cuda, nvrtc
@@ -27,7 +28,7 @@ def main(communicator: Communicator) -> None:
         print("\n".join(f"{name:10} {text}" for name, text in report(communicator, ranks)), flush=True)
 
 
-def report(communicator: Communicator, ranks: list[dict]) -> list[tuple[str, str]]:
+def report(communicator: Communicator, ranks: list[dict[str, Any]]) -> list[tuple[str, str]]:
     """Names and findings."""
     nodes = len({rank["node"] for rank in ranks})
     lines = [

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
@@ -9,7 +12,7 @@ from distfsi.scene.advice import advice, thickness
 from distfsi.scene.description import Body, Scene
 
 
-def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: dict | None = None) -> str:
+def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, Any] | None = None) -> str:
     """Sizes, memory, output, steps and time of `scene` on so many ranks, and advice, as text.
 
     `bench`: what `bench.kept_bench` gives, for the time.
@@ -71,7 +74,7 @@ def _output(resources: Resources) -> str:
     return f"{times} field outputs of about {format_bytes(each)}, {total}"
 
 
-def _time(resources: Resources, threads: int, bench: dict | None) -> str:
+def _time(resources: Resources, threads: int, bench: Mapping[str, Any] | None) -> str:
     if bench is None:
         return "unknown: `distfsi bench` measures this machine once for all"
     seconds = resources.seconds(threads, bench)

@@ -270,7 +270,12 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, overrides, {**shipped(INPUTS), **standard()}, ARCHITECTURES)
 
 
-def _study(communicator, overrides, scenes, architectures) -> None:
+def _study(
+    communicator: Communicator,
+    overrides: Sequence[str],
+    scenes: Mapping[str, Scene],
+    architectures: Sequence[str],
+) -> None:
     if communicator.size > 1 or overrides:
         raise InputError(["study kernels: runs on one rank and takes no overrides"])
     try:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
 from distfsi.scene.shipped import shipped_inputs
@@ -46,9 +47,10 @@ SURROUNDINGS = {
 
 def measure_of(simulation: Simulation) -> Measure:
     """Centre and velocity of the cylinder."""
+    solid = present(simulation.solid)
 
     def measure() -> Mapping[str, float]:
-        body = simulation.solid.body_totals(0)
+        body = solid.body_totals(0)
         (x, y), (u, v) = body["center"], body["momentum"] / body["mass"]
         return {"x": float(x), "y": float(y), "u": float(u), "v": float(v)}
 
@@ -72,7 +74,7 @@ def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str])
 
 def lift_raised(end: float, cells: int = RAISED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_liftoff.lift(RAISED, body.density, end, cells)._asdict()
 
 
@@ -96,17 +98,16 @@ def throw(communicator: Communicator, around: Surroundings, cells: int, override
 
 def flight(around: Surroundings, end: float, cells: int = FITTED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_cylinder.fly(around.mesh(cells), body.density, end)._asdict()
 
 
 def centres(tracks: Tracks) -> list[tuple[float, float]]:
     """(x, y) at the times of the references; NaN where the run does not reach them."""
     latest = tracks["time"][-1] * (1.0 + 1e-9)
-    return [
-        tuple(float(np.interp(r.time, tracks["time"], tracks[axis])) if r.time <= latest else np.nan for axis in "xy")
-        for r in LIFTOFF
-    ]
+    times = [r.time if r.time <= latest else np.nan for r in LIFTOFF]
+    x, y = (np.interp(times, tracks["time"], tracks[axis]) for axis in "xy")
+    return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
 def row(name: str, places: Sequence[tuple[float, float]]) -> str:

@@ -40,7 +40,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, overrides, SHOCK_BUBBLE_SPEEDS, SECONDS)
 
 
-def _study(communicator, overrides, meshes, seconds) -> None:
+def _study(communicator: Communicator, overrides: Sequence[str], meshes: Sequence[MeshSpeed], seconds: float) -> None:
     if communicator.rank == 0:
         print(f"{'the paper, on an RTX 4090':>55}  |{'here':>34}")
         print("cell [mm]      nodes      cells  steps/s  Mcell-steps/s  |     cells  steps/s  Mcell-steps/s")

@@ -69,8 +69,8 @@ class Stability:
                     numbers = np.array([[found[r, c][0] for c in shown.columns] for r in shown.rows])
                     sheets.append(VerdictMap(name, numbers))
                     lines += [[shown.name, name, f"{r:g}", f"{c:.3g}", *self._told(v)] for (r, c), v in found.items()]
-                names = ([f"{v:.3g}" for v in values] for values in (shown.rows, shown.columns))
-                labels = zip((shown.row_label, shown.column_label), names, strict=True)
+                rows, columns = ([f"{v:.3g}" for v in values] for values in (shown.rows, shown.columns))
+                labels = (shown.row_label, rows), (shown.column_label, columns)
                 draw_verdicts(
                     self.directory / f"{shown.name}.png", shown.title, sheets, *labels, self.verdicts, across=2
                 )

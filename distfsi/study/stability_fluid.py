@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.verdicts import VerdictMap, draw_verdicts
 from distfsi.scene import load
 from distfsi.scene.description import FluidEos, FluidState, HalfSpace, IdealGas, Phase, Region, Scene
@@ -155,7 +156,7 @@ def scene_of(tube: Tube, cfl: float, method: Method) -> Scene:
         base,
         domain=replace(base.domain, cells=(CELLS,)),
         time=replace(base.time, end=WAY / fastest_wave(tube), cfl=cfl),
-        fluid=replace(base.fluid, phases=phases, regions=regions),
+        fluid=replace(present(base.fluid), phases=phases, regions=regions),
     )
 
 
@@ -173,7 +174,7 @@ def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
         return Verdict(FAILED, _cause(error))
     if _swings(simulation, tube):
         return Verdict(SWUNG)
-    faces, redone = simulation.fluid.limited_faces(), simulation.rejected_steps
+    faces, redone = present(simulation.fluid).limited_faces(), simulation.rejected_steps
     return Verdict(HELPED, f"{faces} limited faces; {redone} redone steps") if faces or redone else Verdict(SURVIVED)
 
 
@@ -250,10 +251,12 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, [{}, *varied_alone()], MAPS, overrides)
 
 
-def _study(communicator, methods, maps, overrides) -> None:
+def _study(
+    communicator: Communicator, methods: Sequence[Method], maps: Sequence[Map], overrides: Sequence[str]
+) -> None:
     if communicator.size > 1 or overrides:
         raise InputError(["study stability fluid: runs on one rank and takes no overrides"])
-    found = {}
+    found: dict[str, dict[str, list[list[Verdict]]]] = {}
     with threadpool_limits(1):
         for shown in maps:
             print(f"\n{shown.title}: {shown.row_label} by {shown.column_label}")

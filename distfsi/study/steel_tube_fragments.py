@@ -7,7 +7,7 @@ steel; the paper names none. Those of the paper and of the experiment it compare
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,10 +133,16 @@ def maps(directory: Path, what: str) -> list[Picture]:
     return pictures
 
 
-def _drawn(cells, particles, lower, spacing, what) -> np.ndarray:
+def _drawn(
+    cells: Mapping[str, np.ndarray],
+    particles: Mapping[str, np.ndarray],
+    lower: np.ndarray,
+    spacing: np.ndarray,
+    what: str,
+) -> np.ndarray:
     """Speeds of gas and wall, or the colors of the fragments, in the cells."""
     x = particles["position"][:, :2]
-    place = tuple(((x - np.array(lower[:2])) / np.array(spacing[:2])).astype(int).T[::-1])
+    place = tuple(((x - lower[:2]) / spacing[:2]).astype(int).T[::-1])
     speed = np.linalg.norm(cells["velocity"][0], axis=-1)
     if what == "speed":
         speed[place] = np.hypot(*particles["velocity"][:, :2].T)
@@ -172,7 +178,7 @@ def energies(directory: Path) -> Chart:
     """Energy of the quarter of the tube (after the paper's Fig. 27)."""
     history = read_history(directory / "history.csv")
     time, kinetic, internal = (
-        history[name] for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
+        np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
     )
     curves = [
         Curve(1e6 * time, 1e-6 * values, name)

@@ -16,9 +16,12 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene import load
-from distfsi.scene.description import JohnsonCookFailure, Scatter, Solid
+from distfsi.scene.description import JohnsonCookFailure, Scatter
+from distfsi.scene.description import Solid as SolidOfScene
 from distfsi.simulation import Simulation
+from distfsi.solid.solid import Solid
 from distfsi.study.references import STEEL_TUBE
 from distfsi.study.steel_tube import INPUT
 
@@ -70,14 +73,15 @@ class Burst:
 def tube(constants: Sequence[float], seed: int) -> Simulation:
     """A quarter of the tube, with Johnson and Cook's D1 to D5 of failure."""
     scene = load(INPUT)
-    failure = JohnsonCookFailure(*constants, 1.0, None, TOUGHNESS, Scatter(20.0, 1e-3, seed))
-    body = replace(scene.solid.bodies[0], spacing=SPACING, failure=failure)
-    return Simulation.of(replace(scene, fluid=None, solid=Solid((body,), 1.3, 0.5, 1.0)), Communicator(), 1)
+    D1, D2, D3, D4, D5 = constants
+    failure = JohnsonCookFailure(D1, D2, D3, D4, D5, 1.0, None, TOUGHNESS, Scatter(20.0, 1e-3, seed))
+    body = replace(present(scene.solid).bodies[0], spacing=SPACING, failure=failure)
+    return Simulation.of(replace(scene, fluid=None, solid=SolidOfScene((body,), 1.3, 0.5, 1.0)), Communicator(), 1)
 
 
 def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
     """Push the inner surface outward until `end` [s]."""
-    solid, time = tube(constants, seed).solid, 0.0
+    solid, time = present(tube(constants, seed).solid), 0.0
     start = np.hypot(*solid.columns["position"].T)
     inmost = solid.columns["id"][start < start.min() + 0.25 * SPACING]
     inset = start.min() ** 2 - 30e-3**2  # times pi: area inside the inmost particles, which stays
@@ -106,8 +110,8 @@ def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
     return Burst(first_failure, first_break, break_time, 4.0 * (most - 1) if most > 1 else math.nan, velocity)
 
 
-def _pieces(solid) -> int:
-    return int((solid.pieces()["particles"] >= DUST).sum())
+def _pieces(solid: Solid) -> int:
+    return int((present(solid.pieces())["particles"] >= DUST).sum())
 
 
 def scaled(share: float) -> tuple[float, ...]:
@@ -129,7 +133,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, overrides, tuple(CASES), SEEDS)
 
 
-def _study(communicator, overrides, cases, seeds) -> None:
+def _study(communicator: Communicator, overrides: Sequence[str], cases: Sequence[str], seeds: int) -> None:
     if communicator.size > 1 or overrides:
         raise InputError(["study tube_alone: runs on one rank and takes no overrides"])
     DIRECTORY.mkdir(parents=True, exist_ok=True)
