@@ -62,7 +62,7 @@ def test_an_example_is_run_in_an_empty_folder(programs, execute, tmp_path):
 
 
 def test_a_study_is_run_in_an_empty_folder(execute, tmp_path):
-    execute("study", "exact", "cases", "--quick")
+    execute("study", "shock_bubble_speed", "--quick")
     assert {path.name for path in tmp_path.iterdir()} <= {"out"}
 
 

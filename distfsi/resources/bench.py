@@ -235,18 +235,18 @@ def main(
 def kept_bench() -> dict[str, Any] | None:
     """The last complete bench of this machine by this version, if there is one."""
     try:
-        result = json.loads(_place().read_text())
+        result = json.loads(_kept_file().read_text())
     except (OSError, ValueError):
         return None
     return result if result.get("distfsi") == __version__ else None
 
 
 def _keep(result: dict[str, Any]) -> None:
-    _place().parent.mkdir(parents=True, exist_ok=True)
-    temporary = _place().with_suffix(".tmp")
+    _kept_file().parent.mkdir(parents=True, exist_ok=True)
+    temporary = _kept_file().with_suffix(".tmp")
     temporary.write_text(json.dumps(result))
-    os.replace(temporary, _place())
+    os.replace(temporary, _kept_file())
 
 
-def _place() -> Path:
+def _kept_file() -> Path:
     return cache_directory() / f"bench-{platform.node()}.json"

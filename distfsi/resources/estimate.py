@@ -94,10 +94,10 @@ class Resources:
             return 0
         D, domain = self.dimensions, self.scene.domain
         spacing = (np.array(domain.upper) - domain.lower)[:D] / domain.cells[:D]
-        place = np.floor((np.concatenate(list(self.positions.values())) - domain.lower[:D]) / spacing).astype(int)
-        first = place.min(axis=0) - 2
-        occupied = np.zeros(place.max(axis=0) - first + 3, dtype=bool)
-        occupied[tuple((place - first).T)] = True
+        cell = np.floor((np.concatenate(list(self.positions.values())) - domain.lower[:D]) / spacing).astype(int)
+        first = cell.min(axis=0) - 2
+        occupied = np.zeros(cell.max(axis=0) - first + 3, dtype=bool)
+        occupied[tuple((cell - first).T)] = True
         around = np.ones((3,) * D, dtype=bool)
         band = ndimage.binary_dilation(occupied, around, 2) & ~ndimage.binary_erosion(occupied, around)
         inside = tuple(slice(max(-low, 0), n - low) for low, n in zip(first, domain.cells, strict=False))

@@ -40,8 +40,8 @@ def report(communicator: Communicator, ranks: list[dict[str, Any]]) -> list[tupl
         ("kernels", f"kept in {cache_directory()}, {room(cache_directory())}"),
         ("results", f"here, {room(Path.cwd())}"),
     ]
-    places = [f"{rank['node']}, {rank['threads']} threads, {rank['GPU']}" for rank in ranks]
-    return lines + [(f"rank {number}", place) for number, place in enumerate(places)]
+    found = [f"{rank['node']}, {rank['threads']} threads, {rank['GPU']}" for rank in ranks]
+    return lines + [(f"rank {number}", what) for number, what in enumerate(found)]
 
 
 def gpu_of_rank(communicator: Communicator) -> str:

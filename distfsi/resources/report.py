@@ -78,8 +78,8 @@ def _time(resources: Resources, threads: int, bench: Mapping[str, Any] | None) -
     if bench is None:
         return "unknown: `distfsi bench` measures this machine once for all"
     seconds = resources.seconds(threads, bench)
-    place = f"{resources.ranks} rank(s) of {threads} thread(s), by the bench of this machine"
-    return f"about {format_duration(max(seconds, 1.0))} on {place}; compiling, the first time, comes on top"
+    machine = f"{resources.ranks} rank(s) of {threads} thread(s), by the bench of this machine"
+    return f"about {format_duration(max(seconds, 1.0))} on {machine}; compiling, the first time, comes on top"
 
 
 def _metres(lengths: tuple[float, ...]) -> str:

@@ -160,7 +160,7 @@ def whole_without_failure() -> tuple[int, float]:
     return len(present(solid.pieces())["piece"]), float(strain.std() / strain.mean())
 
 
-def told(found: Sizes) -> str:
+def table(found: Sizes) -> str:
     """A table of sizes."""
     lines = [f"{found.law.name}, {ROWS * found.finer} particles thick"]
     if len(found.rates) > 1:
@@ -203,7 +203,7 @@ def _study(
                 found.append(sizes(law, some, seeds, finer))
                 draw(found)
                 write(found)
-                print(told(found[-1]), flush=True)
+                print(table(found[-1]), flush=True)
     print(f"\ntable and chart in {DIRECTORY}", flush=True)
 
 

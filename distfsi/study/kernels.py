@@ -153,8 +153,8 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
 
 def calls_of_debris(communicator: Communicator) -> Calls:
     """What particles call only where they fail, or near other ranks."""
-    team = Listening()
-    simulation = Simulation.of(works.bursting_ball(), communicator, device=team)
+    device = Listening()
+    simulation = Simulation.of(works.bursting_ball(), communicator, device=device)
     for _ in range(STEPS_OF_DEBRIS):
         simulation.step()
     rows, reals = np.zeros(1, np.int64), [np.zeros(1, real) for real in REALS]
@@ -162,7 +162,7 @@ def calls_of_debris(communicator: Communicator) -> Calls:
     packed += [(pack_cells, (rows, rows, rows, 1, values, 1, 1, values)) for values in reals]
     packed += [(unpack_cells, (rows, 1, 1, values, 1, 1, values)) for values in reals]
     kernels = [(Kernel(driver, {}, {}, "float64"), arguments) for driver, arguments in packed]
-    return team.calls | {key_of(*call): call for call in kernels}
+    return device.calls | {key_of(*call): call for call in kernels}
 
 
 @dataclass

@@ -110,9 +110,9 @@ def centres(tracks: Tracks) -> list[tuple[float, float]]:
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def row(name: str, places: Sequence[tuple[float, float]]) -> str:
+def row(name: str, positions: Sequence[tuple[float, float]]) -> str:
     """A line of the table."""
-    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in places)
+    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in positions)
 
 
 def draw(runs: Mapping[int, Tracks]) -> None:

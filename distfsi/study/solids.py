@@ -171,11 +171,11 @@ def verney(simulation: Simulation) -> list[Figure]:
     inset = (
         radius[inner].mean() ** 2 - shell.inner_radius**2
     )  # times pi: area within the innermost particles, which stays
-    least = np.inf
+    smallest = np.inf
     while not simulation.done:
         simulation.step()
-        least = min(least, np.hypot(*by_id(simulation)["position"][inner].T).mean() ** 2 - inset)
-    return [Figure("least inner radius [m]", float(np.sqrt(least)), 40e-3, 0.01), kept_energy(simulation, before)]
+        smallest = min(smallest, np.hypot(*by_id(simulation)["position"][inner].T).mean() ** 2 - inset)
+    return [Figure("least inner radius [m]", float(np.sqrt(smallest)), 40e-3, 0.01), kept_energy(simulation, before)]
 
 
 # ---- bending ---------------------------------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ CFL = (0.1, 0.5, 0.9)
 CELLS, ACROSS = 50, 24  # cells along a tube; across the box of a shell
 SWINGS = 1.2  # total variation of the body's velocity over its range
 LEAK = 1e-9  # of the mass behind the wall
-MOST_STEPS = 4000
+MAXIMUM_STEPS = 4000
 
 
 def scene_of(
@@ -86,7 +86,7 @@ def judge(scene: Scene, leaked: Callable[[Simulation], float], moves: bool = Tru
             simulation.step()
             totals = solid.totals()
             velocity.append(totals["momentum"][0] / totals["mass"])
-            if simulation.steps > MOST_STEPS:
+            if simulation.steps > MAXIMUM_STEPS:
                 return FAILED, "the time step shrinks"
         simulation.check()
     except Diverged as error:

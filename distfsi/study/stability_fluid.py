@@ -2,7 +2,7 @@
 
 Every run is a tube of few cells until its fastest wave has gone most of the way to an end. It has survived when it
 reaches the end with a valid state in every cell; with help, if fluxes were limited or steps redone on the way. What
-survives but swings (its velocity varies much more along the tube than the exact one) is told apart.
+survives but swings (its velocity varies much more along the tube than the exact one) counts as a case of its own.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from distfsi.study.stability import Plane
 DIRECTORY = Path("out/study_stability_fluid")
 CELLS = 50
 WAY = 0.4  # that the fastest wave goes, in lengths of the tube
-MOST_STEPS = 20.0  # times those that the fastest wave should need
+MAXIMUM_STEPS = 20.0  # times those that the fastest wave should need
 SWINGS = 1.5  # total variation of the velocity over the exact one
 HELIUM = IdealGas(5.0 / 3.0)
 
@@ -163,11 +163,11 @@ def scene_of(tube: Tube, cfl: float, method: Method) -> Scene:
 def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
     """Run a tube; what becomes of it."""
     simulation = start(scene_of(tube, cfl, method))
-    most = MOST_STEPS * WAY * CELLS / cfl
+    limit = MAXIMUM_STEPS * WAY * CELLS / cfl
     try:
         while not simulation.done:
             simulation.step()
-            if simulation.steps > most:
+            if simulation.steps > limit:
                 return Verdict(FAILED, "the time step shrinks")
         simulation.check()
     except Diverged as error:
@@ -236,8 +236,8 @@ def write(found: Mapping[str, Mapping[str, list[list[Verdict]]]], maps: Sequence
             for method, rows in found[shown.name].items():
                 for value, row in zip(shown.rows, rows, strict=True):
                     for column, verdict in zip(shown.columns, row, strict=True):
-                        place = (f"{value:g}", f"{column:g}", f"{shown.cfl_of(column):g}")
-                        table.writerow([shown.name, method, *place, names[verdict.number], verdict.why])
+                        at = (f"{value:g}", f"{column:g}", f"{shown.cfl_of(column):g}")
+                        table.writerow([shown.name, method, *at, names[verdict.number], verdict.why])
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:

@@ -142,16 +142,16 @@ def _drawn(
 ) -> np.ndarray:
     """Speeds of gas and wall, or the colors of the fragments, in the cells."""
     x = particles["position"][:, :2]
-    place = tuple(((x - lower[:2]) / spacing[:2]).astype(int).T[::-1])
+    cell = tuple(((x - lower[:2]) / spacing[:2]).astype(int).T[::-1])
     speed = np.linalg.norm(cells["velocity"][0], axis=-1)
     if what == "speed":
-        speed[place] = np.hypot(*particles["velocity"][:, :2].T)
+        speed[cell] = np.hypot(*particles["velocity"][:, :2].T)
         return speed
     numbers = np.full(speed.shape, np.nan)
     pieces, count = np.unique(particles["piece"], return_counts=True)
     large = count >= SMALLEST
     color = np.where(large, 5 + 7 * np.cumsum(large) % 20, 0)  # neighbours far from each other, dust alike
-    numbers[place] = color[np.searchsorted(pieces, particles["piece"])]
+    numbers[cell] = color[np.searchsorted(pieces, particles["piece"])]
     return numbers
 
 
