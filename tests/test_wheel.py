@@ -18,7 +18,7 @@ def programs(tmp_path_factory) -> Path:
     """The folder of programs of a new environment that holds the wheel; the dependencies are those of this one."""
     folder = tmp_path_factory.mktemp("wheel")
     environment = folder / "environment"
-    venv.create(environment)
+    venv.create(environment, symlinks=True)
     (site,) = environment.glob("lib/python*/site-packages")
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"))  # no .pth files in there are followed
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
