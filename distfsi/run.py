@@ -93,11 +93,10 @@ def run(
     if restart is None:
         set_aside(directory, communicator)
     progress = Progress(scene.time.end, communicator)
-    compilation.listener = progress.compiling
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)
     costs, device = None, gpu_of_rank(communicator, direct) if on_gpu else None
-    with requests, closing(progress), threadpool_limits(1), journal:
+    with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
             simulation.asked = requests.strongest

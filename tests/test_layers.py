@@ -13,8 +13,9 @@ PACKAGE = ROOT / "distfsi"
 # From the top down. A folder imports only from those further down; those of one row do not know each other.
 LAYERS = (
     {"__main__"},
-    {"study"},
     {"commands"},
+    {"study"},
+    {"resources"},
     {"run"},
     {"simulation", "direct"},
     {"diagnostics"},
@@ -23,7 +24,7 @@ LAYERS = (
     {"mesh", "device", "output", "scene"},
     {"laws"},
     {"formulas"},
-    {"errors", "__init__"},
+    {"errors", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}
@@ -43,7 +44,7 @@ ONLY_IN = {
 
 TOP_LEVEL = {
     "pyproject.toml", "distfsi", "launch", "tests", "inputs", "README.md", "ARCHITECTURE.md", "docs", ".ci", "LICENSE",
-    "CHANGELOG.md", ".gitignore", ".pre-commit-config.yaml",
+    "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", ".gitignore", ".pre-commit-config.yaml",
 }  # fmt: skip
 
 

@@ -12,9 +12,11 @@ import importlib.util
 import re
 import sys
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -27,19 +29,30 @@ from distfsi.device.fingerprint import fingerprint, texts_depend_on
 from distfsi.device.fold import Bound, flat_values, given_floats
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
+from distfsi.narrowing import present
 
 
 @dataclass
 class Compilation:
-    """What this process has compiled: `made` drivers; `listener` is told of it when another one is about to be."""
+    """What this process has compiled: `made` drivers."""
 
     made: int = 0
-    listener: Callable[[int], None] = field(default=lambda made: None)
+    _listener: Callable[[int], None] | None = None
 
     def begin(self) -> None:
         """A driver is about to be compiled."""
         self.made += 1
-        self.listener(self.made)
+        if self._listener:
+            self._listener(self.made)
+
+    @contextmanager
+    def told(self, listener: Callable[[int], None]) -> Iterator[None]:
+        """Meanwhile `listener` gets the number of each driver that is about to be compiled."""
+        self._listener = listener
+        try:
+            yield
+        finally:
+            self._listener = None
 
 
 compilation = Compilation()
@@ -49,10 +62,12 @@ class Native:
     """A driver, specialised for a scene, for Python to call. It gets the scene's numbers behind its arguments; numba
     compiles it for each list of types that it is called with."""
 
-    def __init__(self, driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str):
+    def __init__(
+        self, driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
+    ):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
         self._numbers: tuple[np.floating, ...] = ()
-        self._call: Callable = self._first_call
+        self._call: Callable[..., Any] = self._first_call
         self._lock = threading.Lock()
 
     def __call__(self, *arguments: Any) -> Any:
@@ -65,7 +80,7 @@ class Native:
             if self._call == self._first_call:
                 module = self.module
                 self._numbers = self.numbers
-                with locked(Path(module.__file__)):
+                with locked(_path(module.__name__.rpartition(".")[2])):
                     result = self.dispatcher(*arguments, *self._numbers)
                 self._call = self.dispatcher
                 return result
@@ -90,9 +105,9 @@ class Native:
         key = fingerprint(self.driver, self.constants, self.bindings, self.real)
         known = cache_directory() / f"{self.driver.__name__}_{key}.name"
         name = known.read_text() if known.exists() else ""
-        if not (name and (cache_directory() / f"{name}.py").exists()):
+        if not (name and _path(name).exists()):
             name, text = self._module_text()
-            write_whole(cache_directory() / f"{name}.py", text.encode())
+            write_whole(_path(name), text.encode())
             write_whole(known, name.encode())
         runtime.WRITERS[name] = self.body
         return _loaded(name)
@@ -132,12 +147,16 @@ class Native:
         return name, "\n".join(lines)
 
 
+def _path(name: str) -> Path:
+    return cache_directory() / f"{name}.py"
+
+
 def _loaded(name: str) -> ModuleType:
     full_name = f"distfsi_kernels.{name}"
     if full_name in sys.modules:
         return sys.modules[full_name]
-    spec = importlib.util.spec_from_file_location(full_name, cache_directory() / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
+    loader = SourceFileLoader(full_name, str(_path(name)))
+    module = importlib.util.module_from_spec(present(importlib.util.spec_from_loader(full_name, loader)))
     sys.modules[full_name] = module
-    spec.loader.exec_module(module)
+    loader.exec_module(module)
     return module
