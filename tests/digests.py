@@ -210,10 +210,12 @@ def read_table() -> dict[str, dict]:
 
 def record(names: list[str]) -> None:
     """Run these cases on one rank and write their digests into the table, which loses what is no case any more."""
-    table = read_table() if TABLE.exists() else {"machine": machine(), "digests": {}}
-    if table["machine"] != machine() and set(names) != set(CASES):
-        raise SystemExit(f"the table is of another machine, so all cases must run anew: {table['machine']}")
-    table["machine"] = machine()
+    here = machine()
+    table = read_table() if TABLE.exists() else {}
+    if table.get("machine") != here:
+        if set(names) != set(CASES):
+            raise SystemExit(f"the table is of another machine, so all cases must run anew: {table.get('machine')}")
+        table = {"machine": here, "digests": {}}
     for name in names:
         started = time.perf_counter()
         with tempfile.TemporaryDirectory() as directory:
