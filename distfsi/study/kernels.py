@@ -73,7 +73,7 @@ Calls = dict[tuple, Call]  # by driver and signature: a kernel, and arguments th
 
 def key_of(kernel: Kernel, arguments: Sequence[Any]) -> tuple:
     """What tells calls of one scene apart."""
-    return kernel.driver, kernel.signature(arguments)
+    return kernel.driver, kernel.signature(kernel.given(arguments))
 
 
 class Inventory(Gpu):
@@ -192,9 +192,10 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
         calls = [*gpu.calls.values()]
         calls += [(kernel, a) for kernel in others for _, a in known[precision(scene), kernel.driver].values()]
         for kernel, arguments in calls:
-            key = repr(kernel), kernel.signature(arguments)
-            text = written.get(key) or written.setdefault(key, kernel.text(arguments))
-            of = texts.setdefault(text, Text(kernel, arguments, scene.domain.dimensions, {}))
+            given = kernel.given(arguments)
+            key = repr(kernel), kernel.signature(given)
+            text = written.get(key) or written.setdefault(key, kernel.text(given))
+            of = texts.setdefault(text, Text(kernel, given, scene.domain.dimensions, {}))
             of.scenes[name] = None
     return texts
 
