@@ -126,7 +126,8 @@ def advance(
         alone = simulation.alone
         try:
             simulation.step()
-            saving = simulation.request is not Request.NOTHING and not simulation.done
+            request = simulation.last_step.request
+            saving = request is not Request.NOTHING and not simulation.done
             if saving:
                 simulation.check()
         except Diverged as error:
@@ -143,11 +144,11 @@ def advance(
         if saving:
             path = records.write_restart({name: part.snapshot() for name, part in kept.items()})
             requests.saved()
-            if simulation.request.stops:
+            if request.stops:
                 requests.remove_stop_file()
                 when = f"at t = {simulation.time:.6g} s after {simulation.steps} steps"
                 remedy = "the same command with --restart auto goes on"
-                raise Stopped(f"stopped {when} by {requests.words(simulation.request)}, state in {path}; {remedy}")
+                raise Stopped(f"stopped {when} by {requests.words(request)}, state in {path}; {remedy}")
         if simulation.steps % STEPS_BETWEEN_DEALS == 0 and simulation.communicator.size > 1:
             costs = balance.watch(simulation.scene.performance.imbalance)
             records.write_balance(balance.imbalance, changes_hands=costs is not None)

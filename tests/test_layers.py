@@ -16,7 +16,7 @@ LAYERS = (
     {"commands"},
     {"run"},
     {"simulation", "direct"},
-    {"diagnostics"},
+    {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},

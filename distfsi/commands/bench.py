@@ -30,7 +30,15 @@ from distfsi.simulation import Simulation, threads_of_rank
 REPEATS = 5
 RIPPLE = 1e-4  # relative
 SHEAR_RATE = 10.0  # 1/s
-CALLS_OF_COUPLING = ("time_step", "update_geometry", "before_stage", "after_stage", "transfer_impulse", "account_work")
+CALLS_OF_COUPLING = (
+    "time_step",
+    "update_geometry",
+    "merge",
+    "apply_wall_fluxes",
+    "redistribute",
+    "transfer_impulse",
+    "account_work",
+)
 
 Result = dict[str, float]
 

@@ -166,7 +166,7 @@ class Coupling:
             position, *bins, self._shape, self._widths, self._origin,
         )  # fmt: skip
 
-    def before_stage(self, stage: Stage) -> None:
+    def merge(self, stage: Stage) -> None:
         """Collective. Give the covered cells of the stage's input, and before the first stage the fresh ones, their
         states (Eqs. 31, 32)."""
         self.fluid.exchange_ghosts(stage)
@@ -182,7 +182,7 @@ class Coupling:
             self._run(k.find_contents, self._fresh, U, self._shape, content)
             self._ledger["fresh"] += self._per_block(kinds.FRESH_CELLS, content) * self._cell_volume
 
-    def after_stage(self, stage: Stage, dt: float) -> None:
+    def apply_wall_fluxes(self, stage: Stage, dt: float) -> None:
         """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage (Eqs. 33,
         35)."""
         weights = self.team.array(stage.weight * dt * self._cell_volume / self._spacing)
@@ -191,8 +191,12 @@ class Coupling:
         self._run(self.fluid_kernels.collect_wall, self._covered, self._passed, *rest)
         self._run(self.fluid_kernels.collect_sides, *self._sides, self._through_sides.device, *rest)
 
-    def transfer_impulse(self) -> Any:
-        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
+    def redistribute(self) -> None:
+        """No cell shares its content with others."""
+
+    def transfer_impulse(self, dt: float) -> Any:
+        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step of `dt` [s], on the
+        device."""
         D, own, team = self._dimensions, self.solid.count, self.team
         wall = (self._covered, self._passed, self._velocity, self._inertia)
         self._run(self.fluid_kernels.spread, *wall, self._kick, self._shape)
