@@ -11,7 +11,8 @@ import numpy as np
 import psutil
 
 from distfsi.coupling.cut_cells.cut_cells import CutCells
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
+from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
 from distfsi.diagnostics.gauges import Gauge, gauge_of
@@ -27,7 +28,7 @@ from distfsi.scene.packing import pack
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
-COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": Coupling}
+COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": ImmersedBoundary}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
@@ -108,8 +109,9 @@ class Simulation:
         self.time += made.dt
         self.steps += 1
         self.watch()
-        if self.coupling and not self.alone and self.scene.coupling.drop_below is not None:
-            self._end_loads(self.scene.coupling.drop_below)
+        minimum = self.scene.coupling.drop_below
+        if minimum is not None and not self.alone and isinstance(self.coupling, ReleasesFluid):
+            self._end_loads(self.coupling, minimum)
 
     def _advance(self) -> TimeStep:
         """Plan a step and make it."""
@@ -132,13 +134,13 @@ class Simulation:
         """Fluid, solid and coupling as far as they are computed."""
         return (None, self.solid, None) if self.alone else (self.fluid, self.solid, self.coupling)
 
-    def _end_loads(self, least: float) -> None:
-        """Collective. Drop the fluid when it pressed on the solid by `least` [Pa] and does no more."""
-        pressure = self.coupling.pressure(self.dt)
-        self.loaded = self.loaded or pressure >= least
-        if self.loaded and pressure < least:
+    def _end_loads(self, coupling: ReleasesFluid, minimum: float) -> None:
+        """Collective. Drop the fluid when it pressed on the solid by `minimum` [Pa] and does no more."""
+        pressure = coupling.pressure(self.dt)
+        self.loaded = self.loaded or pressure >= minimum
+        if self.loaded and pressure < minimum:
             self.alone = True
-            self.coupling.let_fluid_leave()
+            coupling.let_fluid_leave()
             self.solid.given[:] = 0.0
 
     def watch(self) -> None:

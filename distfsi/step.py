@@ -12,15 +12,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling as ImmersedBoundary
+from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE
+from distfsi.coupling.protocol import Coupling
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.requests import Request
-from distfsi.solid.solid import Solid
-
-Coupling = CutCells | ImmersedBoundary
+from distfsi.solid.protocol import Structure
 
 SUB_STEP_SLACK = 1.1  # by how much the solid's limit may fall during its sub-steps
 ATTEMPTS = 8  # at a step of the fluid, each with half the time step of the one before
@@ -70,7 +68,7 @@ class TimeStep:
 
 
 def time_step(
-    fluid: Fluid | None, solid: Solid | None, coupling: Coupling | None, cfl: float, left: float, request: Request,
+    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, cfl: float, left: float, request: Request,
     communicator: Communicator,
 ) -> TimeStep:  # fmt: skip
     """Collective, after find_forces(). The longest stable step of all parts on all ranks, at most what is `left` [s].
@@ -96,7 +94,7 @@ def time_step(
     return TimeStep(dt, sub_steps, reason, Request(int(strongest)), signals, (1.0 / particle_dt, particle))
 
 
-def find_forces(solid: Solid | None, coupling: Coupling | None) -> None:
+def find_forces(solid: Structure | None, coupling: Coupling | None) -> None:
     """Collective. Find each particle's neighbours and the forces between them."""
     if coupling:
         solid.prepare(coupling.reach, coupling.stray)
@@ -104,7 +102,7 @@ def find_forces(solid: Solid | None, coupling: Coupling | None) -> None:
         solid.prepare()
 
 
-def make_step(fluid: Fluid | None, solid: Solid | None, coupling: Coupling | None, planned: TimeStep) -> TimeStep:
+def make_step(fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, planned: TimeStep) -> TimeStep:
     """Collective. Make the planned step of the parts that there are. Raises Diverged."""
     if coupling:
         return coupled_step(fluid, solid, coupling, planned)
@@ -126,14 +124,14 @@ def fluid_step(fluid: Fluid, planned: TimeStep) -> TimeStep:
     raise StepFailed(f"{ATTEMPTS} attempts failed, the last with a step of {dt:.3g} s")
 
 
-def solid_step(solid: Solid, planned: TimeStep) -> TimeStep:
+def solid_step(solid: Structure, planned: TimeStep) -> TimeStep:
     """Advance the solid by one step."""
     solid.advance(planned.dt)  # Eqs. 5-7
     solid.migrate()
     return planned
 
 
-def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, planned: TimeStep) -> TimeStep:
+def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeStep:
     """Advance fluid and solid together by one step."""
     made = sub_cycle(solid, coupling, planned)  # Eqs. 5-7
     coupling.update_geometry()
@@ -157,7 +155,7 @@ def advance_stage(fluid: Fluid, stage: Stage, dt: float) -> None:
     fluid.end_stage(stage)
 
 
-def sub_cycle(solid: Solid, coupling: Coupling, planned: TimeStep) -> TimeStep:
+def sub_cycle(solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeStep:
     """Advance the solid in equal sub-steps, with no force of the fluid meanwhile.
 
     The step is shorter than planned when the solid's own limit has fallen below a sub-step, or when another one would

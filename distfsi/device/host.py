@@ -137,11 +137,11 @@ class HostRuntime:
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         return np.empty(count, dtype)
 
-    def upload(self, there: HostArray, host: np.ndarray, queue: Queue) -> None:
-        self._add(queue, partial(np.copyto, there.memory, host))
+    def upload(self, array: HostArray, host: np.ndarray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, array.memory, host))
 
-    def download(self, host: np.ndarray, there: HostArray, queue: Queue) -> None:
-        self._add(queue, partial(np.copyto, host, there.memory))
+    def download(self, host: np.ndarray, array: HostArray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, host, array.memory))
 
     def order(self, first: Queue, then: Queue) -> None:
         self._last[then] = Task(lambda: None, [self._last[then], self._last[first]])

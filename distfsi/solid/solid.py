@@ -31,6 +31,7 @@ from distfsi.solid.kernels import material, motion
 from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
 
@@ -89,7 +90,7 @@ class Solid:
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, team, self.kernels)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
-        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(
+        self.form: SolidForm = UpdatedLagrangian(
             self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
         )
         if scene.solid.form == "total_lagrangian":

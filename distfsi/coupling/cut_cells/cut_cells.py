@@ -29,7 +29,7 @@ from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, u
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
@@ -79,7 +79,7 @@ class CutCells:
     causes = ("wall", "sides")
     reach = 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Structure, blocks: Blocks, team: Device):
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions

@@ -21,7 +21,7 @@ from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 COVER_RADIUS = 1.5  # in cells, of the kernel that decides what is covered; at least three particle spacings
 VELOCITY_RADIUS = 1.4  # in cover radii, of the kernel between particles and cells; at most the ghost cells allow
@@ -49,7 +49,7 @@ FLUID_DRIVERS = (
 )
 
 
-class Coupling:
+class ImmersedBoundary:
     """What the solid covers of the fluid's grid, the state of the covered cells, and the forces across the wall.
 
     reach   [m]: how far the solid's ghosts and images must go
@@ -61,7 +61,7 @@ class Coupling:
     causes = ("wall", "covered", "fresh", "sides")
     sub_steps, stray = 1, 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Structure, blocks: Blocks, team: Device):
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
