@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from distfsi.device import cpu
+from distfsi.device.fold import flat_values
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
 
@@ -37,9 +38,10 @@ class SideBySide:
     def _both(self, host: HostKernel, compiled: Callable) -> Callable:
         def call(begin: int, end: int, *arguments) -> None:
             name = host.kernel.name
+            arguments = list(flat_values(arguments))
             copies = copies_of(arguments)
             compiled(begin, end, *arguments)
-            host(end - begin, copies, reverse=self.calls[name] % 2 == 1)
+            host(end - begin, host.kernel.given(copies), reverse=self.calls[name] % 2 == 1)
             self.calls[name] += 1
             for place, (mine, other) in enumerate(zip(arguments, copies, strict=True)):
                 if isinstance(mine, np.ndarray) and mine.tobytes() != other.tobytes():

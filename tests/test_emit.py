@@ -4,12 +4,16 @@ import ast
 import math
 import subprocess
 import sys
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from distfsi.device import cpu, emit, runtime
 from distfsi.device.fold import Bound, NotInSubset
+from distfsi.device.host import HostKernel
+from distfsi.device.kernel import Kernel
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import Symbol, chosen
@@ -35,14 +39,15 @@ def _own_cache(tmp_path_factory, monkeypatch):
 
 
 def text_of(function, constants=None, bindings=None, real="float64"):
-    return emit.numba_text(function, constants or {}, bindings or {}, real, runtime.VERSION)
+    text, _ = emit.numba_text(function, constants or {}, bindings or {}, real, runtime.VERSION)
+    return text
 
 
 def body_of(function, **constants):
     """The emitted function without its signature, literals in place."""
     emission = emit.Emission(constants, {})
-    name = emission.add(function, {})
-    return [ast.unparse(statement) for statement in emission.functions[name][1].body]
+    callee = emission.add(function)
+    return [ast.unparse(statement) for statement in emission.functions[callee.name][1].body]
 
 
 def both(function, *arguments, constants=None, bindings=None):
@@ -176,7 +181,7 @@ def test_what_follows_a_return_is_not_emitted():
 
 def test_static_loops_are_unrolled():
     weights = (0.5, 1.0, 0.0)
-    lines = ["total = x", "total = total + x", "total = total", "return total"]
+    lines = ["total = x", "total = total + numbers_[0] * x", "total = total", "return total"]
     assert body_of(unrolled_loop, N=3, WEIGHTS=weights) == lines
     assert both(unrolled_loop, 2.0, constants={"N": 3, "WEIGHTS": weights}) == 4.0
 
@@ -195,12 +200,14 @@ def test_sums_of_nothing_vanish():
 
 
 def test_tuples_of_constants_can_be_indexed():
-    assert body_of(tuple_constants, WEIGHTS=(3.0, 5.0)) == ["return x * 3.0 + 10.0"]
+    assert body_of(tuple_constants, WEIGHTS=(3.0, 5.0)) == ["return x * numbers_[0] + numbers_[1]"]
+    assert both(tuple_constants, 1.0, constants={"WEIGHTS": (3.0, 5.0)}) == 13.0
 
 
 def test_a_callee_that_returns_a_constant_is_inlined():
     constants = {"GAMMA": 4.0}
-    assert body_of(calls_a_constant, **constants) == ["return -2.0"]
+    assert body_of(calls_a_constant, **constants) == ["return numbers_[0]"]
+    assert both(calls_a_constant, 1.0, constants=constants) == -2.0
     assert "constant_pair" not in text_of(calls_a_constant, constants).split("def calls_a_constant")[1]
 
 
@@ -556,23 +563,137 @@ def test_two_formulas_of_one_name_are_refused():
 
     elsewhere.__name__ = "scaled__first_material"
     emission = emit.Emission({"GAMMA": 2.0}, {"first_material": Bound(scaled)})
-    emission.add(elsewhere, {})
+    emission.add(elsewhere)
     with pytest.raises(
         NotInSubset, match=r"test_emit.py, line \d+: scaled__first_material is also .*test_emit.py, line"
     ):
-        emission.add(scaled, {}, "__first_material")
+        emission.add(scaled, Bound(scaled), "__first_material")
+
+
+# ---- numbers and records ---------------------------------------------------------------------------------------------
+
+
+class Window(NamedTuple):
+    start: np.ndarray
+    step: float
+
+
+class Pair(NamedTuple):
+    left: Window
+    weight: float
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A law: numbers and formulas of them."""
+
+    stiffness: float
+    rest: float
+
+    def stretch(self, x):
+        return x - self.rest
+
+    def force(self, x):
+        return -self.stiffness * self.stretch(x) + HALF * self.rest
+
+
+def arithmetic_of_numbers(x):
+    return x * (1.0 / GAMMA) + (GAMMA - 1.0) * -GAMMA / 2.0
+
+
+def choice_by_a_number(x):
+    y = x if GAMMA > 1.0 else -x
+    if GAMMA:
+        return y + GAMMA
+    return y
+
+
+@helper
+def value_at(window: Window, i):
+    return window.start[i] * window.step
+
+
+@driver
+def walk(begin, end, pair: Pair, out):
+    for i in range(begin, end):
+        out[i] = value_at(pair.left, i) + pair.weight * float_of(pair)
+
+
+@helper
+def float_of(pair: Pair):
+    return pair.left.step
+
+
+@driver
+def pull(begin, end, springs, out):
+    for i in range(begin, end):
+        spring = tuple(springs[i, k] for k in static_range(2))
+        out[i] = first_material(spring, HALF)
+
+
+def two_springs(x):
+    return first_material(x) + second_material(x)
+
+
+def test_arithmetic_among_numbers_is_done_once_in_double():
+    assert body_of(arithmetic_of_numbers, GAMMA=3.0) == ["return x * numbers_[0] + numbers_[1]"]
+    emission = emit.Emission({"GAMMA": 3.0}, {})
+    emission.add(arithmetic_of_numbers)
+    assert emission.numbers == {"(1.0 / GAMMA)": 1.0 / 3.0, "(((GAMMA - 1.0) * -GAMMA) / 2.0)": -3.0}
+
+
+def test_numbers_decide_at_run_time_but_for_zero():
+    assert both(choice_by_a_number, 2.0, constants={"GAMMA": 3.0}) == 5.0
+    assert both(choice_by_a_number, 2.0, constants={"GAMMA": 0.5}) == -1.5
+    assert body_of(choice_by_a_number, GAMMA=0.0) == ["y = -x", "return y"]
+
+
+def test_records_are_flattened_for_both_writers():
+    out, start = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    pair = Pair(Window(start, 2.0), 10.0)
+    cpu.build([walk], {}).walk(0, 3, pair, out)
+    assert out.tolist() == [22.0, 24.0, 26.0]
+    kernel = Kernel(walk, {}, {}, "float64")
+    other = np.zeros(3)
+    HostKernel(kernel)(3, kernel.given((pair, other)))
+    assert other.tolist() == out.tolist()
+
+
+def springs(first, second):
+    return {"first_material": Bound.of(first, "force"), "second_material": Bound.of(second, "force")}
+
+
+def test_a_law_gives_its_formulas_its_numbers():
+    bindings = {
+        "first_material": Bound.of(Spring(2.0, 1.0), "force"),
+        "second_material": Bound.of(Spring(5.0, 3.0), "force"),
+    }
+    assert both(two_springs, 4.0, bindings=bindings) == (-6.0 + 0.5) + (-5.0 + 1.5)
+    other = {
+        "first_material": Bound.of(Spring(7.0, 2.0), "force"),
+        "second_material": Bound.of(Spring(1.0, 4.0), "force"),
+    }
+    assert text_of(two_springs, {}, bindings) == text_of(two_springs, {}, other)
+    assert Spring(2.0, 1.0).force(4.0) == -5.5
+
+
+def test_a_law_may_come_from_a_table():
+    out = np.zeros(2)
+    cpu.build([pull], {}, {"first_material": Bound(Spring.force)}).pull(0, 2, np.array([[2.0, 1.0], [5.0, 3.0]]), out)
+    assert out.tolist() == [Spring(2.0, 1.0).force(HALF), Spring(5.0, 3.0).force(HALF)]
 
 
 # ---- modules and their cache -----------------------------------------------------------------------------------------
 
 
 def test_the_module_is_named_by_its_text():
-    texts = [text_of(scaled, {"GAMMA": gamma}) for gamma in (1.4, 1.4, 1.5)]
-    names = [emit.module_name(scaled, text) for text in texts]
+    texts = [text_of(weightless, {"N": n, "WEIGHTS": (1.0, 2.0)}) for n in (1, 1, 2)]
+    names = [emit.module_name(weightless, text) for text in texts]
     assert names[0] == names[1] != names[2]
-    assert emit.module_name(scaled, text_of(scaled, {"GAMMA": 1.4}, real="float32")) != names[0]
-    other_runtime = emit.numba_text(scaled, {"GAMMA": 1.4}, {}, "float64", runtime.VERSION + "+")
-    assert emit.module_name(scaled, other_runtime) != names[0]
+    constants = {"N": 1, "WEIGHTS": (1.0, 2.0)}
+    assert emit.module_name(weightless, text_of(weightless, constants, real="float32")) != names[0]
+    other_runtime, _ = emit.numba_text(weightless, constants, {}, "float64", runtime.VERSION + "+")
+    assert emit.module_name(weightless, other_runtime) != names[0]
 
 
 def test_the_text_names_the_source():
@@ -582,7 +703,8 @@ def test_the_text_names_the_source():
 
 
 def test_two_scenes_live_side_by_side():
-    """A changed constant gives another module, never a stale one."""
+    """What a scene measures is given to one module at run time; a number that is 0 is folded away."""
+    assert text_of(scaled, {"GAMMA": 1.4}) == text_of(scaled, {"GAMMA": 1.5}) != text_of(scaled, {"GAMMA": 0.0})
     values = [cpu.build([scaled], {"GAMMA": gamma}).scaled(1.0) for gamma in (1.4, 1.5, 1.4)]
     assert values == [1.4, 1.5, 1.4]
 

@@ -86,10 +86,10 @@ def calls():
 
         def keeping(driver):
             def call(begin, end, *arguments):
-                before = copies_of(arguments)
-                getattr(compiled, driver.__name__)(begin, end, *arguments)
                 kernel = Kernel(driver, constants, bindings or {}, real)
-                kept[driver.__name__] = kernel, end, before, copies_of(arguments)
+                before = copies_of(kernel.given(arguments))
+                getattr(compiled, driver.__name__)(begin, end, *arguments)
+                kept[driver.__name__] = kernel, end, before, copies_of(kernel.given(arguments))
 
             return call
 

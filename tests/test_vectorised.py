@@ -45,7 +45,7 @@ def module_text(row, scene):
     return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
 
 
-def machine_code(row, text, real):
+def machine_code(row, text, numbers, real):
     """What the module's row becomes for arrays (upper-case names), reals and integers."""
     module = {}
     exec(text, module)
@@ -57,6 +57,7 @@ def machine_code(row, text, real):
         else 0
         for name in inspect.signature(row).parameters
     ]
+    arguments += map(np.dtype(real).type, numbers)
     module[row.__name__].compile(tuple(map(typeof, arguments)))
     return "\n".join(module[row.__name__].inspect_asm().values())
 
@@ -73,7 +74,7 @@ def test_rows_are_packed(row, scene):
     """Each loop has a packed body without any scalar arithmetic; scalar is only the remainder."""
     names, dimensions, real = SCENES[scene]
     own, other = ("d", "s") if real == "float64" else ("s", "d")
-    code = machine_code(row, module_text(row, scene), real)
+    code = machine_code(row, *module_text(row, scene), real)
     bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
     loops = model_of(*names, dimensions=dimensions).variables if row is fluid.rises_row else 1
     assert len(bodies) >= loops
@@ -87,9 +88,11 @@ def test_rows_are_packed(row, scene):
 @pytest.mark.parametrize("row", [fluid.flux_row, fluid.update_row], ids=lambda row: row.__name__)
 def test_without_the_promise_of_no_alias_rows_are_scalar(row):
     """So that the test above does fail on the day the compile option is no longer heard."""
-    text = module_text(row, "water-air-2D")
+    text, numbers = module_text(row, "water-air-2D")
     plain_row = "from numba import njit\nrow = njit(error_model='numpy')\n"
-    code = machine_code(row, text.replace("real = np.float64\n", "real = np.float64\n" + plain_row, 1), "float64")
+    code = machine_code(
+        row, text.replace("real = np.float64\n", "real = np.float64\n" + plain_row, 1), numbers, "float64"
+    )
     assert count(code, "mul", "sd", ["xmm"]) > 10
     assert count(code, "mul", "pd", WIDE) == 0
 
@@ -128,7 +131,7 @@ def example(name):
 @pytest.mark.parametrize("driver", POINTS, ids=lambda driver: driver.__name__)
 def test_points_near_each_other_are_packed(driver, tmp_path):
     """What a particle is to LANES points is computed at once: in the driver, where its rows know how many there are."""
-    text = emit.numba_text(driver, {"DIMENSIONS": 3, "LANES": 8, "KICKS": 4}, {}, "float64", runtime.VERSION)
+    text, _ = emit.numba_text(driver, {"DIMENSIONS": 3, "LANES": 8, "KICKS": 4}, {}, "float64", runtime.VERSION)
     (tmp_path / "kernel.py").write_text(text)
     function = runpy.run_path(str(tmp_path / "kernel.py"))[driver.__name__]
     function(*map(example, inspect.signature(driver).parameters))

@@ -17,7 +17,7 @@ import numpy as np
 
 from distfsi.device import emit, runtime
 from distfsi.device.cache import cache_directory, locked, write_whole
-from distfsi.device.fold import Bound, NotInSubset
+from distfsi.device.fold import Bound, NotInSubset, flat_values
 
 __all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
 
@@ -35,9 +35,10 @@ def build(
     """
     compiled = {}
     for driver in drivers:
-        text = emit.numba_text(driver, constants, bindings or {}, real, runtime.VERSION)
+        text, numbers = emit.numba_text(driver, constants, bindings or {}, real, runtime.VERSION)
         module = _load(emit.module_name(driver, text), text)
-        compiled[driver.__name__] = _Compiled(getattr(module, driver.__name__), Path(module.__file__))
+        numbers = tuple(map(np.dtype(real).type, numbers))
+        compiled[driver.__name__] = _Compiled(getattr(module, driver.__name__), Path(module.__file__), numbers)
     return SimpleNamespace(**compiled)
 
 
@@ -56,15 +57,16 @@ def _load(name: str, text: str) -> ModuleType:
 
 
 class _Compiled:
-    """A driver that compiles at its first call, in one process of a machine at a time: others then find it on disk."""
+    """A driver and the `numbers` of a scene. It compiles at its first call, in one process of a machine at a time:
+    others then find it on disk."""
 
-    def __init__(self, dispatcher: Callable, path: Path):
-        self.dispatcher, self.path = dispatcher, path
+    def __init__(self, dispatcher: Callable, path: Path, numbers: tuple[np.floating, ...]):
+        self.dispatcher, self.path, self.numbers = dispatcher, path, numbers
         self._call: Callable = self._first_call
         self._lock = threading.Lock()
 
     def __call__(self, *arguments):
-        return self._call(*arguments)
+        return self._call(*flat_values(arguments), *self.numbers)
 
     def _first_call(self, *arguments):
         with self._lock:

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from distfsi.device.emit import Emission, callees_first
+from distfsi.device.emit import Emission, callees_first, number_names
 from distfsi.device.exponential import EXPONENTIALS
-from distfsi.device.fold import Bound, NotInSubset, Source
+from distfsi.device.fold import Bound, Callee, NotInSubset, Source, parameters_of
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<",
@@ -33,6 +33,7 @@ WORDS = {
     "abs": "magnitude",
     "floor": "floored",
     "int": "truncated",
+    "int32": "integer",
     "len": "length",
 }
 WORDS |= {"exp": "exponential", "log": "logarithm", "pow": "power", "sqrt": "square_root", "real": "real"}
@@ -73,12 +74,13 @@ def kernel_text(
     real: str,
     arguments: Sequence[object],
 ) -> str:
-    """The CUDA C of a driver's kernel `NAME_kernel(begin, end, …)`, for arguments like `arguments`.
+    """The CUDA C of a driver's kernel `NAME_kernel(begin, end, …)`, for arguments like `arguments`, which are flat, the
+    numbers of the scene behind them.
 
     An array becomes its address and its shape; all others are passed by value. Raises NotInSubset.
     """
     emission = Emission(constants, bindings)
-    emission.add(driver, {})
+    emission.root(driver)
     *callees, (source, tree) = callees_first(emission.functions)
     functions = [Writer(s, real).function(t) for s, t in callees] + [Writer(source, real).driver(tree)]
     names = [argument.arg for argument in tree.args.args[2:]]
@@ -99,29 +101,44 @@ def text_by_hand(
     arguments: Sequence[object],
 ) -> str:
     """The CUDA C of a kernel whose loops are written by hand, with the formulas and numbers that it is made for."""
-    written, (_, _, *names) = driver.__by_hand__, inspect.signature(driver).parameters
-    numbers = {name: value for name, value in constants.items() if type(value) in (int, bool)}
-    numbers |= written.block(constants, dict(zip(names, arguments, strict=True)))
-    lines = [f"constexpr int {name} = {int(value)};" for name, value in numbers.items()]
-    lines += [f"#define HAS_{name}" for name in numbers]
-    lines += [f"constexpr real HALF = {number(0.5, real)};", f"#define PARAMETERS {parameters(names, arguments)}"]
-    formulas = formulas_text(written.formulas, constants, bindings, real)
-    file = Path(inspect.getfile(driver)).parent / written.file
-    return in_namespace(real, ["\n".join(lines), formulas, file.read_text()])
-
-
-def formulas_text(
-    names: Sequence[str], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
-) -> str:
-    """The CUDA C of those of `names` to which a scene binds a formula, for a hand-written kernel that calls them so."""
-    emission, names = Emission(constants, bindings), [name for name in names if name in bindings]
-    emitted = {name: emission.add(bindings[name].function, bindings[name].constants, "__" + name) for name in names}
-    parts = [Writer(s, real).function(t) for s, t in callees_first(emission.functions, emitted.values())]
-    parts += [
-        f"DEVICE auto {name}(auto... values)\n{{\n    return {formula}(values...);\n}}"
-        for name, formula in emitted.items()
+    written, names = driver.__by_hand__, parameters_of(driver)
+    emission, formulas = formulas_by_hand(driver, constants, bindings)
+    scalars = number_names(len(emission.numbers))
+    integers = {name: value for name, value in constants.items() if type(value) in (int, bool)}
+    integers |= written.block(constants, dict(zip(names, arguments, strict=False)))
+    lines = [f"constexpr int {name} = {int(value)};" for name, value in integers.items()]
+    lines += [f"#define HAS_{name}" for name in integers]
+    lines += [
+        f"constexpr real HALF = {number(0.5, real)};",
+        f"#define PARAMETERS {parameters([*names, *scalars], arguments)}",
+        f"#define NUMBERS pack({', '.join(scalars)})",
     ]
-    return "\n\n".join(parts)
+    functions = callees_first(emission.functions, [callee.name for callee in formulas.values()])
+    parts = [Writer(source, real).function(tree) for source, tree in functions]
+    for name, callee in formulas.items():
+        numbers = ", numbers" if callee.takes_numbers else ""
+        call = f"return {callee.name}(values...{numbers});"
+        parts.append(f"DEVICE auto {name}(const auto &numbers, auto... values)\n{{\n    {call}\n}}")
+    file = Path(inspect.getfile(driver)).parent / written.file
+    return in_namespace(real, ["\n".join(lines), "\n\n".join(parts), file.read_text()])
+
+
+def formulas_by_hand(
+    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]
+) -> tuple[Emission, dict[str, Callee]]:
+    """The formulas that a hand-written kernel calls, as far as a scene binds them, by the names in which it does."""
+    emission, names = Emission(constants, bindings), [n for n in driver.__by_hand__.formulas if n in bindings]
+    return emission, {n: emission.add(bindings[n].function, bindings[n], "__" + n) for n in names}
+
+
+def numbers_of(driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> tuple[float, ...]:
+    """What the scene measures, in the order in which the driver's kernel gets it. Raises NotInSubset."""
+    if hasattr(driver, "__by_hand__"):
+        emission, _ = formulas_by_hand(driver, constants, bindings)
+    else:
+        emission = Emission(constants, bindings)
+        emission.root(driver)
+    return tuple(emission.numbers.values())
 
 
 def in_namespace(real: str, parts: Sequence[str]) -> str:

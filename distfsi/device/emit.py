@@ -10,71 +10,122 @@ import ast
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from distfsi.device import markers
-from distfsi.device.fold import Bound, Fold, NotInSubset, Source, constant_of
+from distfsi.device.fold import (
+    NUMBERS,
+    Bound,
+    Callee,
+    Fold,
+    NotInSubset,
+    Number,
+    Source,
+    copied,
+    given,
+    is_fixed,
+    literal,
+)
+
+
+class _Numbered(ast.NodeTransformer):
+    """Each Number becomes an item of the tuple of numbers."""
+
+    def __init__(self, numbers: dict[str, float]):
+        self.numbers, self.places, self.found = numbers, list(numbers), False
+
+    def visit_Number(self, node: Number) -> ast.expr:
+        self.found = True
+        if node.id not in self.numbers:
+            self.numbers[node.id] = node.value
+            self.places.append(node.id)
+        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
 
 
 @dataclass
 class Emission:
-    """The functions that `driver` reaches, folded, callees first."""
+    """The functions that `driver` reaches, folded, callees first.
+
+    numbers  what the scene measures, by name, in the order in which the driver gets it behind its other arguments
+    """
 
     constants: Mapping[str, object]
     bindings: Mapping[str, Bound]
     functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
-    _names: dict[tuple[Callable, str], str] = field(default_factory=dict)
+    numbers: dict[str, float] = field(default_factory=dict)
+    _callees: dict[tuple[Callable, str], Callee] = field(default_factory=dict)
 
-    def add(self, function: Callable, scope: Mapping[str, object], suffix: str = "") -> str:
-        """Fold `function` and all it calls; return the name it is emitted under."""
+    def add(self, function: Callable, scope: Bound | None = None, suffix: str = "") -> Callee:
+        """Fold `function` and all it calls, with the constants of `scope`."""
         key = (function, suffix)
-        if key in self._names:
-            return self._names[key]
-        name = function.__name__ + suffix
-        if name in self.functions or name in self._names.values():
-            other = next(f for (f, _), emitted in self._names.items() if emitted == name)
-            raise NotInSubset(f"{Source(function).place}: {name} is also the name of {Source(other).place}")
-        self._names[key] = name
+        if key in self._callees:
+            return self._callees[key]
+        name = Source(function).name + suffix
+        if name in self.functions:
+            raise NotInSubset(f"{Source(function).place}: {name} is also the name of {self.functions[name][0].place}")
         source = Source(function)
-        tree = Fold(
-            source, lambda n: self._constant(function, scope, n), lambda n: self._callee(function, scope, suffix, n)
-        ).run()
-        tree.name = name
-        self.functions[name] = (source, tree)
-        return name
+        self.functions[name] = source, ast.FunctionDef()  # its name is taken
+        lookup, call = (partial(find, function, scope, suffix) for find in (self._constant, self._callee))
+        fold = Fold(source, lookup, call)
+        tree = fold.run()
+        tree.name, count = name, len(tree.args.args)
+        result = _fixed_result(tree)
+        numbered = _Numbered(self.numbers)
+        numbered.visit(tree)
+        takes_numbers = numbered.found or any(isinstance(n, ast.Name) and n.id == NUMBERS for n in ast.walk(tree))
+        if takes_numbers:
+            tree.args.args.append(ast.arg(NUMBERS))
+        del self.functions[name]
+        self.functions[name] = source, ast.fix_missing_locations(tree)
+        self._callees[key] = Callee(name, fold.parameters, count, takes_numbers, result)
+        return self._callees[key]
 
-    def _constant(self, function: Callable, scope: Mapping[str, object], name: str) -> object:
-        if name in scope:
-            return scope[name]
+    def root(self, function: Callable) -> str:
+        """Fold a driver, which gets the numbers one by one behind its other arguments; the name it is emitted under."""
+        callee = self.add(function)
+        _, tree = self.functions[callee.name]
+        if callee.takes_numbers:
+            names = number_names(len(self.numbers))
+            tree.args.args[-1:] = [ast.arg(name) for name in names]
+            whole = ast.Tuple([ast.Name(name, ast.Load()) for name in names], ast.Load())
+            tree.body.insert(0, ast.Assign([ast.Name(NUMBERS, ast.Store())], whole))
+            ast.fix_missing_locations(tree)
+        return callee.name
+
+    def _constant(self, function: Callable, scope: Bound | None, suffix: str, name: str) -> ast.expr:
+        if scope is not None and name in scope.constants:
+            return given(scope.constants[name], f"{scope.owner or suffix}.{name}")
         if name in self.constants:
-            return self.constants[name]
+            return given(self.constants[name], name)
         value = function.__globals__[name]
         if isinstance(value, (bool, int, float)) or (
             isinstance(value, tuple) and all(isinstance(v, (int, float)) for v in value)
         ):
-            return value
+            return literal(value)
         raise KeyError(name)
 
-    def _callee(
-        self, caller: Callable, scope: Mapping[str, object], suffix: str, name: str
-    ) -> tuple[str, ast.expr | None]:
+    def _callee(self, caller: Callable, scope: Bound | None, suffix: str, name: str) -> Callee:
         if name in self.bindings:
             bound = self.bindings[name]
-            emitted = self.add(bound.function, bound.constants, "__" + name)
-        else:
-            function = caller.__globals__[name]
-            if not callable(function) or not hasattr(function, "__code__"):
-                raise KeyError(name)
-            emitted = self.add(function, scope, suffix if scope else "")
-        return emitted, self._constant_result(emitted)
+            return self.add(bound.function, bound, "__" + name)
+        record, _, formula = name.rpartition(".")
+        function = getattr(Source(caller).parameters[record], formula) if record else caller.__globals__[name]
+        if not callable(function) or not hasattr(function, "__code__"):
+            raise KeyError(name)
+        return self.add(function, scope, suffix if scope and scope.constants else "")
 
-    def _constant_result(self, name: str) -> ast.expr | None:
-        """The value of a function that merely returns a constant."""
-        body = self.functions[name][1].body
-        if len(body) == 1 and isinstance(body[0], ast.Return) and constant_of(body[0].value)[0]:
-            return body[0].value
-        return None
+
+def number_names(count: int) -> list[str]:
+    """The parameters of a driver in which it gets the numbers of the scene."""
+    return [f"number_{k}" for k in range(count)]
+
+
+def _fixed_result(tree: ast.FunctionDef) -> ast.expr | None:
+    """What a function merely returns, if that is the same in every call."""
+    fixed = len(tree.body) == 1 and isinstance(tree.body[0], ast.Return) and is_fixed(tree.body[0].value)
+    return copied(tree.body[0].value) if fixed else None
 
 
 class _TypedLiterals(ast.NodeTransformer):
@@ -91,10 +142,11 @@ class _TypedLiterals(ast.NodeTransformer):
 
 def numba_text(
     driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str, runtime_version: str
-) -> str:
-    """The module text for one driver, or for a formula as if it were one; `real` is "float64" or "float32"."""
+) -> tuple[str, tuple[float, ...]]:
+    """The module text for one driver, or for a formula as if it were one, and the numbers that it gets behind its other
+    arguments; `real` is "float64" or "float32"."""
     emission = Emission(constants, bindings)
-    root = emission.add(driver, {})
+    root = emission.root(driver)
     literals, parts = _TypedLiterals(), []
     for source, tree in callees_first(emission.functions):
         text = ast.unparse(literals.visit(tree))
@@ -108,12 +160,14 @@ def numba_text(
         "from distfsi.device.runtime import driver, formula, helper, load, max_ as max, min_ as min, row, store",
         f"from distfsi.device.runtime import exp_{real} as exp",
         f"real = np.{real}",
+        "int32 = np.int32",
         "",
         "@helper",
         "def workspace(n):",
         "    return np.empty(n, real)",
     ]
-    return "\n".join(head) + "\n\n" + "\n".join(values) + "\n\n" + "\n\n".join(parts) + "\n"
+    text = "\n".join(head) + "\n\n" + "\n".join(values) + "\n\n" + "\n\n".join(parts) + "\n"
+    return text, tuple(emission.numbers.values())
 
 
 def _number(text: str) -> str:
@@ -150,10 +204,11 @@ def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping
     Works on numpy arrays too, as long as the formula makes no choices.
     """
     emission = Emission(constants, bindings or {})
-    name = emission.add(function, {})
+    name = emission.root(function)
     words = {"sqrt": np.sqrt, "exp": np.exp, "log": np.log, "pow": np.power, "floor": np.floor, "workspace": np.empty}
-    namespace = {**words, "load": markers.load, "store": markers.store, "real": float}
+    namespace = {**words, "load": markers.load, "store": markers.store, "real": float, "int32": int}
     namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
     for _, tree in callees_first(emission.functions):
         exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)
-    return namespace[name]
+    formula, numbers = namespace[name], tuple(emission.numbers.values())
+    return (lambda *arguments: formula(*arguments, *numbers)) if numbers else formula

@@ -1,8 +1,11 @@
-"""Folding: one function of the formula subset with everything a scene fixes replaced by its value.
+"""Folding: one function of the formula subset, specialised for what a scene is.
 
-The result is a plain `ast.FunctionDef` in which constants are literals, branches on constants are resolved,
-`static_range` loops are unrolled and arithmetic with 0 and 1 has vanished. Anything outside the subset is refused with
-the module and line it stands on.
+The result is a plain `ast.FunctionDef` in which branches on what the scene fixes are resolved, `static_range` loops are
+unrolled and arithmetic with 0 and 1 has vanished. Whole numbers and truth values of a scene are literals. What a scene
+measures, its floats, are not: each becomes a `Number`, a place for a value that a kernel gets at run time, and so does
+arithmetic among them; only a 0.0 is folded, as what a scene does not use it does not compute. Records (named tuples and
+laws, the types of parameters) are flattened to a parameter per field. Anything outside the subset is refused with the
+module and line it stands on.
 """
 
 from __future__ import annotations
@@ -12,12 +15,15 @@ import inspect
 import operator
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, is_dataclass
+from dataclasses import fields as dataclass_fields
 from functools import cache
+from typing import get_type_hints
 
+NUMBERS = "numbers_"  # the tuple in which functions hand on what a scene measures
 MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
-KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "len", "real")
+KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "int32", "len", "real")
 
 _OPERATORS = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -34,10 +40,38 @@ class NotInSubset(Exception):
 
 @dataclass(frozen=True)
 class Bound:
-    """The formula a scene puts in the place of a name, with the constants that belong to it alone."""
+    """The formula a scene puts in the place of a name, with the constants that belong to it alone.
+
+    owner  whose constants they are: formulas of one owner share its numbers
+    """
 
     function: Callable
     constants: Mapping[str, object] = field(default_factory=dict)
+    owner: str = ""
+
+    @classmethod
+    def of(cls, law: object, formula: str, owner: str = "") -> Bound:
+        """A formula of a law whose fields the scene gives."""
+        fields = {f"self.{name}": getattr(law, name) for name in fields_of(type(law))}
+        return cls(getattr(type(law), formula), fields, owner)
+
+
+@dataclass(frozen=True)
+class Callee:
+    """A function as its callers see it.
+
+    name           it is emitted under
+    parameters     those of its source, each with its class if it is a record
+    count          of its flat parameters, the numbers of the scene apart
+    takes_numbers  whether these come last
+    result         what it returns if that is the same in every call
+    """
+
+    name: str
+    parameters: Mapping[str, type | None]
+    count: int
+    takes_numbers: bool
+    result: ast.expr | None
 
 
 @dataclass(frozen=True)
@@ -55,12 +89,83 @@ class Source:
         module = self.function.__module__.replace(".", "/")
         return f"{module}.py, line {self.function.__code__.co_firstlineno}"
 
+    @property
+    def name(self) -> str:
+        """The name of the function, behind that of its law if it is a law's."""
+        law = self.parameters.get("self")
+        return f"{law.__name__}_{self.function.__name__}" if law else self.function.__name__
+
+    @property
+    def parameters(self) -> dict[str, type | None]:
+        """The parameters in order, each with its class if it is a record; `self` of a law's formula is the law."""
+        code = self.function.__code__
+        found: dict[str, type | None] = {}
+        for name in code.co_varnames[: code.co_argcount]:
+            class_ = self.function.__annotations__.get(name)
+            if name == "self":
+                class_ = _class_of(self.function)
+            elif isinstance(class_, str):
+                class_ = eval(class_, self.function.__globals__)  # annotations of the project's own sources
+            found[name] = class_ if is_record(class_) else None
+        return found
+
     def tree(self) -> ast.FunctionDef:
         """A tree of its own for each call."""
         tree = _parsed(self.function)
         if not isinstance(tree, ast.FunctionDef):
             raise NotInSubset(f"{self.place}: only plain functions can be emitted")
         return copied(tree)
+
+
+def _class_of(function: Callable) -> type:
+    """The class whose body a function stands in, at the top of its module."""
+    return function.__globals__[function.__qualname__.split(".")[0]]
+
+
+def is_record(class_: object) -> bool:
+    """Whether a class is a record: a named tuple, or a law (a dataclass of numbers)."""
+    return isinstance(class_, type) and (hasattr(class_, "_fields") or is_dataclass(class_))
+
+
+def fields_of(record: type) -> dict[str, object]:
+    """The names and types of a record's fields."""
+    types = get_type_hints(record)
+    return {f.name: types[f.name] for f in dataclass_fields(record)} if is_dataclass(record) else types
+
+
+def flat_names(name: str, record: type) -> list[str]:
+    """The parameters that a record of this name becomes, records in it flattened, too."""
+    out = []
+    for field_name, kind in fields_of(record).items():
+        flat = f"{name}_{field_name}"
+        out += flat_names(flat, kind) if is_record(kind) else [flat]
+    return out
+
+
+def parameters_of(driver: Callable) -> list[str]:
+    """The flat parameters of a driver behind begin and end."""
+    found = Source(driver).parameters.items()
+    return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][2:]
+
+
+def flat_values(arguments: Iterable[object]) -> Iterator[object]:
+    """What a kernel is called with: its arguments, records replaced by their fields."""
+    for argument in arguments:
+        if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+            yield from flat_values(argument)
+        else:
+            yield argument
+
+
+def named(node: ast.expr) -> ast.expr:
+    """The tree with each Number as a plain name, for a text."""
+    if isinstance(node, Number):
+        return ast.Name(node.id, ast.Load())
+    new = copied(node)
+    for name, value in vars(new).items():
+        if isinstance(value, ast.expr):
+            setattr(new, name, named(value))
+    return new
 
 
 @cache
@@ -89,11 +194,38 @@ def stored_names(node: ast.AST, sometimes: tuple[type, ...], within: bool = Fals
         yield from stored_names(child, sometimes, within)
 
 
+class Number(ast.Name):
+    """A number that a scene measures, or arithmetic among such: `id` says which, whatever its `value` is."""
+
+    def __init__(self, id: str = "", value: float = 0.0):
+        super().__init__(id, ast.Load())
+        self.value = value
+
+
 def literal(value: object) -> ast.expr:
     """The tree of a constant: a number, a truth value or a tuple of them."""
     if isinstance(value, tuple):
         return ast.Tuple([literal(item) for item in value], ast.Load())
     return ast.Constant(value)
+
+
+def given(value: object, label: str) -> ast.expr:
+    """The tree of a constant that a scene gives, in which floats other than 0.0 are Numbers of that label."""
+    if isinstance(value, tuple):
+        return ast.Tuple([given(item, f"{label}[{k}]") for k, item in enumerate(value)], ast.Load())
+    return Number(label, float(value)) if isinstance(value, float) and value != 0.0 else ast.Constant(value)
+
+
+def is_fixed(node: ast.expr) -> bool:
+    """Whether a tree is a constant, a Number, or a tuple of such: the same in every call."""
+    if isinstance(node, ast.Tuple):
+        return all(map(is_fixed, node.elts))
+    return isinstance(node, (ast.Constant, Number))
+
+
+def truth_of(node: ast.expr) -> tuple[bool, object]:
+    """(True, value) when it is known whether the tree is true; a Number is, as it is not 0.0."""
+    return (True, True) if isinstance(node, Number) else constant_of(node)
 
 
 def constant_of(node: ast.expr) -> tuple[bool, object]:
@@ -110,13 +242,11 @@ def constant_of(node: ast.expr) -> tuple[bool, object]:
 class Fold(ast.NodeTransformer):
     """Folds one function.
 
-    `lookup(name)` gives a scene constant; `call(name)` the name a callee is emitted under and, when the callee merely
-    returns a constant, that constant. Both raise KeyError for what they do not know.
+    `lookup(name)` gives the tree of a scene constant; `call(name)` the callee. Both raise KeyError for what they do not
+    know.
     """
 
-    def __init__(
-        self, source: Source, lookup: Callable[[str], object], call: Callable[[str], tuple[str, ast.expr | None]]
-    ):
+    def __init__(self, source: Source, lookup: Callable[[str], ast.expr], call: Callable[[str], Callee]):
         self.source, self.lookup, self.call = source, lookup, call
         self.known: dict[str, ast.expr] = {}
         self.locals: set[str] = set()
@@ -129,8 +259,11 @@ class Fold(ast.NodeTransformer):
     def run(self) -> ast.FunctionDef:
         tree = self.source.tree()
         tree.decorator_list, tree.returns = [], None
-        for argument in tree.args.args:
-            argument.annotation = None
+        self.records = {name: class_ for name, class_ in self.source.parameters.items() if class_ is not None}
+        flat = {name: self.flat_parameters(name, class_) for name, class_ in self.source.parameters.items()}
+        self.parameters = {name: class_ for name, class_ in self.source.parameters.items() if flat[name]}
+        names = [name for each in flat.values() for name in each]
+        tree.args.args = [ast.arg(name) for name in names]
         sometimes = (ast.For, ast.While, ast.AugAssign, *((ast.If,) if self.in_kernel else ()))
         stored = list(stored_names(tree, sometimes))
         times = Counter(name for name, _ in stored)
@@ -140,6 +273,20 @@ class Fold(ast.NodeTransformer):
         if not self.in_kernel:
             self.refuse_integers(tree)
         return ast.fix_missing_locations(tree)
+
+    def flat_parameters(self, name: str, record: type | None) -> list[str]:
+        """The parameters that one of the source becomes: one per field of a record, but for those that are fixed."""
+        if record is None:
+            return [name]
+        return [flat for flat in flat_names(name, record) if not self.is_given(name, flat)]
+
+    def is_given(self, name: str, flat: str) -> bool:
+        """Whether the scene gives the field of a record."""
+        try:
+            self.lookup(f"{name}.{flat[len(name) + 1 :]}")
+        except KeyError:
+            return False
+        return True
 
     def refuse_integers(self, tree: ast.AST) -> None:
         """Integers are for indices and arguments of other formulas; elsewhere they turn float32 into float64."""
@@ -168,11 +315,11 @@ class Fold(ast.NodeTransformer):
             raise self.refuse(node, "one target per assignment")
         node.value = self.visit(node.value)
         target = node.targets[0]
-        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and constant_of(node.value)[0]:
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and is_fixed(node.value):
             parts = zip(target.elts, node.value.elts, strict=True)
             return self.statements([ast.copy_location(ast.Assign([t], v), node) for t, v in parts])
         if isinstance(target, ast.Name):
-            if target.id in self.propagate and constant_of(node.value)[0]:
+            if target.id in self.propagate and is_fixed(node.value):
                 self.known[target.id] = node.value
                 return None
         elif isinstance(target, ast.Subscript):
@@ -193,7 +340,7 @@ class Fold(ast.NodeTransformer):
 
     def visit_If(self, node: ast.If):
         test = self.visit(node.test)
-        known, value = constant_of(test)
+        known, value = truth_of(test)
         if known:
             return self.statements(node.body if value else node.orelse)
         if not self.in_kernel:
@@ -244,7 +391,7 @@ class Fold(ast.NodeTransformer):
         if node.id in self.locals:
             return node
         try:
-            return literal(self.lookup(node.id))
+            return self.lookup(node.id)
         except KeyError:
             raise self.refuse(node, f"{node.id} is neither a local name nor fixed by the scene") from None
 
@@ -262,6 +409,8 @@ class Fold(ast.NodeTransformer):
         simpler = self.identity(node)
         if simpler is not None:
             return simpler
+        if isinstance(left, (ast.Constant, Number)) and isinstance(right, (ast.Constant, Number)):
+            return Number(f"({ast.unparse(named(node))})", _OPERATORS[type(node.op)](left.value, right.value))
         return node
 
     @staticmethod
@@ -292,6 +441,8 @@ class Fold(ast.NodeTransformer):
             raise self.refuse(node, f"operator {type(node.op).__name__} is not in the subset")
         if isinstance(node.operand, ast.Constant):
             return ast.copy_location(ast.Constant(_OPERATORS[type(node.op)](node.operand.value)), node)
+        if isinstance(node.operand, Number) and isinstance(node.op, ast.USub):
+            return Number(f"-{node.operand.id}", -node.operand.value)
         return node
 
     def visit_Compare(self, node: ast.Compare):
@@ -309,7 +460,7 @@ class Fold(ast.NodeTransformer):
         stop = isinstance(node.op, ast.Or)  # the value that decides
         values = []
         for value in (self.visit(v) for v in node.values):
-            known, truth = constant_of(value)
+            known, truth = truth_of(value)
             if known and bool(truth) == stop:
                 values.append(ast.Constant(stop))
                 break
@@ -322,7 +473,7 @@ class Fold(ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp):
         test = self.visit(node.test)
-        known, value = constant_of(test)
+        known, value = truth_of(test)
         if known:
             return self.visit(node.body if value else node.orelse)
         node.test, node.body, node.orelse = test, self.visit(node.body), self.visit(node.orelse)
@@ -338,9 +489,52 @@ class Fold(ast.NodeTransformer):
         return node
 
     def visit_Attribute(self, node: ast.Attribute):
+        record = self.record_of(node.value)
+        if record is not None:
+            return self.field_of(node, *record)
         if not self.in_kernel or node.attr not in ("shape", "size"):
-            raise self.refuse(node, "no attributes but the shape and size of arrays, and those in kernels")
+            raise self.refuse(node, "no attributes but fields of records and, in kernels, the shape and size of arrays")
+        node.value = self.visit(node.value)
         return node
+
+    # ---- records -----------------------------------------------------------------------------------------------------
+
+    def record_of(self, node: ast.expr) -> tuple[str, type] | None:
+        """The flat name and the class of a record: a parameter, or a field of a record that is one itself."""
+        if isinstance(node, ast.Name) and node.id in self.records:
+            return node.id, self.records[node.id]
+        if isinstance(node, ast.Attribute):
+            outer = self.record_of(node.value)
+            inner = fields_of(outer[1]).get(node.attr) if outer else None
+            if inner is not None and is_record(inner):
+                return f"{outer[0]}_{node.attr}", inner
+        return None
+
+    def field_of(self, node: ast.Attribute, name: str, record: type) -> ast.expr:
+        """A field of a record: a flat parameter, or what the scene gives for the field of a law that it fixes."""
+        if node.attr not in fields_of(record):
+            raise self.refuse(node, f"{record.__name__} has no field {node.attr}")
+        try:
+            return self.lookup(f"{name}.{node.attr}")
+        except KeyError:
+            return ast.Name(f"{name}_{node.attr}", ast.Load())
+
+    def flattened(self, call: ast.Call, parameters: Mapping[str, type | None]) -> list[ast.expr]:
+        """The arguments of a call in which each record has become its fields."""
+        out: list[ast.expr] = []
+        stars = any(isinstance(argument, ast.Starred) for argument in call.args)
+        wanted = [None] * len(call.args) if stars else [*parameters.values()]
+        for k, argument in enumerate(call.args):
+            record, class_ = self.record_of(argument), wanted[k] if k < len(wanted) else None
+            if record is None and class_ is None:
+                out.append(argument)
+            elif record is not None:
+                if class_ is not record[1]:
+                    raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {record[1].__name__}")
+                out += [ast.Name(flat, ast.Load()) for flat in self.flat_parameters(record[0], record[1])]
+            else:  # a tuple that holds the fields
+                out += [ast.Subscript(argument, ast.Constant(k), ast.Load()) for k in range(len(fields_of(class_)))]
+        return out
 
     def visit_Tuple(self, node: ast.Tuple):
         if isinstance(node.ctx, ast.Load):
@@ -348,6 +542,10 @@ class Fold(ast.NodeTransformer):
         return node
 
     def visit_Call(self, node: ast.Call):
+        if isinstance(node.func, ast.Attribute) and self.record_of(node.func.value):
+            if self.flat_parameters(*self.record_of(node.func.value)):
+                node.args.insert(0, node.func.value)
+            node.func = ast.Name(ast.unparse(node.func), ast.Load())  # a formula of a law
         if not isinstance(node.func, ast.Name) or node.keywords:
             raise self.refuse(node, "call functions by their plain names, without keywords")
         name = node.func.id
@@ -359,18 +557,23 @@ class Fold(ast.NodeTransformer):
             for item in items[1:]:
                 total = self.combined(ast.copy_location(ast.BinOp(total, ast.Add(), item), node))
             return total
-        node.args = self.expanded(node.args)
         if name in MATH_WORDS or (self.in_kernel and name in KERNEL_WORDS):
+            node.args = self.expanded(node.args)
             return node
         if name in self.locals:
             raise self.refuse(node, f"{name} is a local value, not a formula")
         try:
-            emitted, constant = self.call(name)
+            callee = self.call(name)
         except KeyError:
             raise self.refuse(node, f"{name} is not a formula and the scene binds nothing to it") from None
-        if constant is not None:
-            return copied(constant)
-        node.func = ast.Name(emitted, ast.Load())
+        if callee.result is not None:
+            return copied(callee.result)
+        node.args = self.expanded(self.flattened(node, callee.parameters))
+        if len(node.args) != callee.count:
+            raise self.refuse(node, f"{name} takes {callee.count} values, not {len(node.args)}")
+        if callee.takes_numbers:
+            node.args.append(ast.Name(NUMBERS, ast.Load()))
+        node.func = ast.Name(callee.name, ast.Load())
         return node
 
     def generic_visit(self, node: ast.AST):

@@ -91,6 +91,7 @@ class Gpu:
     def run(self, kernel: Kernel, count: int, *arguments: Any) -> None:
         if not count:
             return
+        arguments = kernel.given(arguments)
         if any(isinstance(argument, np.ndarray) for argument in arguments):
             raise TypeError(f"{kernel.name} gets an array of the host")
         key = (id(kernel), *kernel.signature(arguments))

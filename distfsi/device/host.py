@@ -45,7 +45,7 @@ class HostKernel:
         self._compiled: dict[tuple, tuple[Callable, bool]] = {}
 
     def __call__(self, count: int, arguments: Sequence[object], reverse: bool = False) -> None:
-        """Run the items 0 … count; arrays are numpy arrays here."""
+        """Run the items 0 … count with the arguments that the kernel is `given`; arrays are numpy arrays here."""
         key, launch = self.kernel.signature(arguments), self.kernel.launch(arguments)
         if key not in self._compiled:
             self._compiled[key] = self._compile(arguments)

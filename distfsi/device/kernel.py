@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, text_by_hand
-from distfsi.device.fold import Bound
+from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, numbers_of, text_by_hand
+from distfsi.device.fold import Bound, flat_values, parameters_of
 from distfsi.device.markers import ByHand
 
 
@@ -40,8 +40,17 @@ class Kernel:
     def name(self) -> str:
         return self.driver.__name__
 
+    @cached_property
+    def numbers(self) -> tuple[np.floating, ...]:
+        """What the scene measures: a kernel gets it behind its other arguments."""
+        return tuple(map(np.dtype(self.real).type, numbers_of(self.driver, self.constants, self.bindings)))
+
+    def given(self, arguments: Iterable[object]) -> list[object]:
+        """What the kernel is called with: the arguments (without begin and end), records flattened, and the numbers."""
+        return [*flat_values(arguments), *self.numbers]
+
     def text(self, arguments: Sequence[object]) -> str:
-        """The CUDA C for arguments (without begin and end) like these. Raises NotInSubset."""
+        """The CUDA C for arguments like those that are `given`. Raises NotInSubset."""
         write = text_by_hand if self._by_hand else kernel_text
         return write(self.driver, self.constants, self.bindings, self.real, arguments)
 
@@ -62,8 +71,7 @@ class Kernel:
         return getattr(self.driver, "__by_hand__", None)
 
     def _named(self, arguments: Sequence[object]) -> dict[str, object]:
-        _, _, *names = inspect.signature(self.driver).parameters
-        return dict(zip(names, arguments, strict=True))
+        return dict(zip(parameters_of(self.driver), arguments, strict=False))
 
 
 def file_name(name: str, text: str) -> str:

@@ -58,6 +58,7 @@ def store(A, i, x):
 
 
 real = float  # in a kernel: the scene's precision
+int32 = int  # a count in a loop that must vectorise: one of 64 bits would halve how many float32 are packed
 
 
 def workspace(n):

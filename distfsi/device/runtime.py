@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 
 from distfsi.device.exponential import EXPONENTIALS, Exponential
 
-VERSION = "3"
+VERSION = "4"
 
 _OPTIONS = cpu_target.options
 if not hasattr(_OPTIONS, "noalias"):

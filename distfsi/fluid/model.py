@@ -6,7 +6,7 @@ A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, singledispatch
 
 import numpy as np
@@ -145,8 +145,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
     bindings |= {name: Bound(function) for name, function in solver}
-    bindings |= {f"reference_{k}": e.reference for k, e in enumerate(eos, 1)}
-    bindings |= {f"stored_reference_{k}": reference for k, reference in enumerate(_stored_references(fluid, eos), 1)}
+    for k, (e, stored) in enumerate(zip(eos, _stored_references(fluid, eos), strict=True), 1):
+        bindings[f"reference_{k}"] = replace(e.reference, owner=f"phase {k}")
+        bindings[f"stored_reference_{k}"] = replace(stored, owner=f"phase {k}")
     return FluidModel(constants, bindings, eos, dimensions)
 
 

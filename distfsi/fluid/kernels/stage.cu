@@ -1,6 +1,7 @@
 // The loops of fluid/kernels/stage.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, FINISHES, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their names; and for the stage
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, FINISHES, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their
+// names, whose first argument are the `numbers` of the scene, NUMBERS; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
 // ---- tuples and arrays ------------------------------------------------------------------------------------------------
@@ -79,18 +80,19 @@ template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int
 }
 
 // How far variable v rises from the low face of a cell to its mean and from there to its high face.
-template <int AXIS> DEVICE auto rises(const real *W, bool sharp, int i, int j, int k)
+template <int AXIS> DEVICE auto rises(const auto &numbers, const real *W, bool sharp, int i, int j, int k)
 {
     real values[2 * GHOSTS - 1];
 #pragma unroll
     for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = W[cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
     const auto cells = tuple_of<2 * GHOSTS - 1>(values);
-    return SHARPENED && sharp ? sharpened(cells) : reconstructed(cells);
+    return SHARPENED && sharp ? sharpened(numbers, cells) : reconstructed(numbers, cells);
 }
 
 // Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
 // cell * dt/h. Whether it was limited.
-template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real rate, real *F, int step)
+template <int AXIS>
+DEVICE bool flux(const auto &numbers, const real *P, int i, int j, int k, real rate, real *F, int step)
 {
     real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
     const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
@@ -99,25 +101,25 @@ template <int AXIS> DEVICE bool flux(const real *P, int i, int j, int k, real ra
         const real *W = P + rotated(v, AXIS) * SP;
         const bool sharp = v == VARIABLES - 1;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + item<1>(rises<AXIS>(W, sharp, i, j, k));
-        right[v] = W[high] - item<0>(rises<AXIS>(W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+        left[v] = W[low] + item<1>(rises<AXIS>(numbers, W, sharp, i, j, k));
+        right[v] = W[high] - item<0>(rises<AXIS>(numbers, W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
     if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
     const auto L = tuple_of<VARIABLES>(left), R = tuple_of<VARIABLES>(right);
-    put(face_flux(L, R, jump), F, step);
+    put(face_flux(numbers, L, R, jump), F, step);
     for (int v = 0; v < FLUXES; v++) value[v] = F[v * step];
     const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
     const auto f = tuple_of<FLUXES>(value);
-    real c = minimum(sound_speed(L), sound_speed(R));
-    if constexpr (CURVED) c = minimum(c, minimum(sound_speed(l), sound_speed(r)));
-    if (!(reserve(l, r, f, c, rate) < 0) || is_admissible(l, r, f, rate)) return false;
-    put(limited_flux(l, r, f, jump, rate), F, step);
+    real c = minimum(sound_speed(numbers, L), sound_speed(numbers, R));
+    if constexpr (CURVED) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
+    if (!(reserve(numbers, l, r, f, c, rate) < 0) || is_admissible(numbers, l, r, f, rate)) return false;
+    put(limited_flux(numbers, l, r, f, jump, rate), F, step);
     return true;
 }
 
 // P = primitives of plane k of the cells at U, with n x m cells and their ghosts.
-DEVICE void load_plane(const real *U, real *P, int k, int n, int m, int tx, int ty, long long sy, long long sz, long long su)
+DEVICE void load_plane(const auto &numbers, const real *U, real *P, int k, int n, int m, int tx, int ty, long long sy, long long sz, long long su)
 {
     for (int j = ty - GY; j < m + GY; j += TILE_Y) {
         for (int i = tx - GHOSTS; i < n + GHOSTS; i += TILE_X) {
@@ -125,7 +127,7 @@ DEVICE void load_plane(const real *U, real *P, int k, int n, int m, int tx, int 
             real state[VARIABLES];
 #pragma unroll
             for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
-            put(primitives(tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
+            put(primitives(numbers, tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
         }
     }
 }
@@ -159,10 +161,10 @@ DEVICE void book(double *through, const real *F, int axis, int step, int n, int 
 }
 
 // U_new = one Runge-Kutta stage of a cell, relaxed to the end. (A template: not every scene has all these formulas.)
-template <class... T> DEVICE void advance(Tuple<T...> before, Tuple<T...> now, Tuple<T...> W, auto D, real b, real dt,
+template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> before, Tuple<T...> now, Tuple<T...> W, auto D, real b, real dt,
                                           real *U_new, long long su)
 {
-    const auto state = updated(before, now, W, D, b, dt);
+    const auto state = updated(numbers, before, now, W, D, b, dt);
     if constexpr (!FINISHES) {
         put(state, U_new, su);
     } else {
@@ -171,11 +173,11 @@ template <class... T> DEVICE void advance(Tuple<T...> before, Tuple<T...> now, T
 #pragma unroll
         for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
         if (values[VARIABLES] >= 0) return;
-        const auto start = before_relaxation(before, now, W, D, b, dt);
-        auto range = range_of_change(item<1>(item<0>(start)));
+        const auto start = before_relaxation(numbers, before, now, W, D, b, dt);
+        auto range = range_of_change(numbers, item<1>(item<0>(start)));
 #pragma unroll 1
-        for (int n = 0; n < HALVINGS; n++) range = halved_range(item<0>(start), item<0>(range), item<1>(range));
-        U_new[(VARIABLES - 1) * su] = fraction_after(before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+        for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
+        U_new[(VARIABLES - 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
     }
 }
 
@@ -185,6 +187,7 @@ enum { BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES };
 extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PARAMETERS)
 {
     DYNAMIC_SHARED(shared);
+    const auto numbers = NUMBERS;
     real *P = (real *)shared, *F = P + VARIABLES * SP;
     const int tx = threadIdx.x % TILE_X, ty = threadIdx.x / TILE_X;
     const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
@@ -210,10 +213,10 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * cx, ry = sides_of_cell * cy, rz = sides_of_cell * cz;
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
-    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(U + u0, P, k, n, m, tx, ty, sy, sz, su);
+    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, U + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
-        if (inside) count += flux<2>(P, tx, ty, -1, rz, low, APART);
+        if (inside) count += flux<2>(numbers, P, tx, ty, -1, rz, low, APART);
         if (sides & 16) {
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
@@ -223,10 +226,10 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         __syncthreads();
     }
     for (int k = 0; k < l; k++) {
-        if constexpr (DIMENSIONS > 2) load_plane(U + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
+        if constexpr (DIMENSIONS > 2) load_plane(numbers, U + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
-                count += flux<0>(P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
+                count += flux<0>(numbers, P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
         __syncthreads();
         if (inside) {
 #pragma unroll
@@ -243,7 +246,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             __syncthreads();
             if (tx < n)
                 for (int j = ty; j < m + 1; j += TILE_Y)
-                    count += flux<1>(P, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
+                    count += flux<1>(numbers, P, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
             __syncthreads();
             if (inside) {
 #pragma unroll
@@ -257,7 +260,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         }
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                count += flux<2>(P, tx, ty, k, rz, high, APART) && k < l - 1;
+                count += flux<2>(numbers, P, tx, ty, k, rz, high, APART) && k < l - 1;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++)
                     D[v * APART] = D[v * APART] + (high[place(v, 2) * APART] - low[place(v, 2) * APART]) * cz;
@@ -285,7 +288,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
             const auto divergence = tuple_of<FLUXES>(D, APART);
-            advance(tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
+            advance(numbers, tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
         }
         __syncthreads();
     }
@@ -312,6 +315,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
 extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(PARAMETERS)
 {
     __shared__ real largest[THREADS];
+    const auto numbers = NUMBERS;
     const real rates[3] = {rx, ry, rz};
     const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
     const long long at = begin + blockIdx.x;
@@ -323,8 +327,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(
         real state[VARIABLES];
 #pragma unroll
         for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
-        const auto W = primitives(tuple_of<VARIABLES>(state));
-        const real c = sound_speed(W);
+        const auto W = primitives(numbers, tuple_of<VARIABLES>(state));
+        const real c = sound_speed(numbers, W);
         real w[VARIABLES];
         put(W, w, 1);
         real signal = (magnitude(w[PHASES]) + c) * rates[0];

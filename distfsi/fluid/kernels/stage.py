@@ -14,7 +14,7 @@ have their velocity components rotated so that the normal one comes first.
 
 from math import sqrt
 
-from distfsi.device.markers import ByHand, driver, helper, load, real, row, store, workspace
+from distfsi.device.markers import ByHand, driver, helper, int32, load, real, row, store, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
     CURVED,
@@ -129,7 +129,7 @@ def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, r
 
     Along the other axes neighbours are side_1 and side_2 apart. rate: faces of a cell * dt/h.
     """
-    count = 0
+    count = int32(0)
     for i in range(n):
         low, high = cell_mean(P, p + i, sp, axis), cell_mean(P, p + step + i, sp, axis)
         left = tuple(low[v] + load(T, t_low + rotated(v, axis) * st + i) for v in static_range(VARIABLES))
@@ -142,7 +142,7 @@ def flux_row(P, T, F, p, sp, step, side_1, side_2, t_low, t_high, st, f, axis, r
             c = min(c, min(sound_speed(low), sound_speed(high)))
         left_over = reserve(low, high, flux, c, rate)
         store(F, f + FLUXES * st + i, left_over)
-        count += 1 if left_over < 0.0 else 0
+        count = int32(count + (1 if left_over < 0.0 else 0))
     return count
 
 
@@ -211,7 +211,7 @@ def update_row(
 
     Returns how many cells have not relaxed; T[0 …] is negative for those.
     """
-    count = 0
+    count = int32(0)
     for i in range(n):
         new = updated(
             tuple(load(U_n, u + v * su + i) for v in static_range(VARIABLES)),
@@ -225,7 +225,7 @@ def update_row(
             store(U_new, u + v * su + i, new[v])
         if FINISHES:
             store(T, i, new[VARIABLES])
-            count += 1 if new[VARIABLES] < 0.0 else 0
+            count = int32(count + (1 if new[VARIABLES] < 0.0 else 0))
     return count
 
 
