@@ -15,6 +15,7 @@ from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundar
 from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
+from distfsi.device.timers import Timers
 from distfsi.diagnostics.gauges import Gauge, gauge_of
 from distfsi.diagnostics.peaks import Peaks, schlieren
 from distfsi.errors import Diverged, StepFailed
@@ -38,6 +39,7 @@ NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller 
 class Simulation:
     """The parts of a scene on this rank, and the step that advances them.
 
+    timers    count the parts of a step (distfsi/step.py)
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
     last_step   the step made last
@@ -53,6 +55,7 @@ class Simulation:
     fluid: Fluid | None
     solid: Solid | None
     coupling: Coupling | None
+    timers: Timers
     watchers: list[Peaks | Gauge] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
@@ -82,7 +85,7 @@ class Simulation:
         solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
         coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling)
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(team))
         if scene.output.peaks:
             simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
         simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
@@ -115,14 +118,15 @@ class Simulation:
 
     def _advance(self) -> TimeStep:
         """Plan a step and make it."""
-        _, solid, coupling = self._active
-        find_forces(solid, coupling)
-        return make_step(*self._active, self.time_step())
+        fluid, solid, coupling = self._active
+        find_forces(solid, coupling, self.timers)
+        return make_step(fluid, solid, coupling, self.time_step(), self.timers)
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
-        time = self.scene.time
-        return time_step(*self._active, time.cfl, time.end - self.time, self.asked(), self.communicator)
+        time, left = self.scene.time, self.scene.time.end - self.time
+        with self.timers("time step"):
+            return time_step(*self._active, time.cfl, left, self.asked(), self.communicator, self.timers)
 
     @property
     def dt(self) -> float:
@@ -145,8 +149,9 @@ class Simulation:
 
     def watch(self) -> None:
         """Show the state to the watchers: once before the first step, then after each."""
-        for watcher in self.watchers:
-            watcher.after_step(self)
+        with self.timers("output"):
+            for watcher in self.watchers:
+                watcher.after_step(self)
 
     def name_limit(self) -> str:
         """Collective. What set the last time step; if the fluid did, where it was fastest and how fast. Progress tells

@@ -1,7 +1,7 @@
 """The time step as the paper tells it (Sec. 4 and Fig. 4): how long it may be, and what it does, in order.
 
 Forces between particles come first, since they bound the step. `time_step` then plans one and changes nothing; a step
-function makes it, or a shorter one, and returns the one it has made.
+function makes it, or a shorter one, and returns the one it has made. Its parts are timed by their names.
 """
 
 from __future__ import annotations
@@ -14,11 +14,18 @@ import numpy as np
 
 from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE
 from distfsi.coupling.protocol import Coupling
+from distfsi.device.timers import Timers
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.requests import Request
+from distfsi.scene.description import Scene
 from distfsi.solid.protocol import Structure
+
+# Parts of a step by what is there, as timers count them; what is written and sampled between steps is "output".
+FLUID_PARTS = ("exchange", "stage")
+SOLID_PARTS = ("solid",)
+COUPLING_PARTS = ("geometry", "merge", "flux", "forces")
 
 SUB_STEP_SLACK = 1.1  # by how much the solid's limit may fall during its sub-steps
 ATTEMPTS = 8  # at a step of the fluid, each with half the time step of the one before
@@ -67,9 +74,17 @@ class TimeStep:
         return max(communicator.allgather(self.particle), key=lambda limit: limit[0])[1]
 
 
+def parts_of(scene: Scene) -> tuple[str, ...]:
+    """The parts that the steps of a scene have."""
+    fluid, solid = scene.fluid is not None, scene.solid is not None
+    return (
+        "time step", *FLUID_PARTS * fluid, *COUPLING_PARTS * (fluid and solid), *SOLID_PARTS * solid, "output",
+    )  # fmt: skip
+
+
 def time_step(
     fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, cfl: float, left: float, request: Request,
-    communicator: Communicator,
+    communicator: Communicator, timers: Timers,
 ) -> TimeStep:  # fmt: skip
     """Collective, after find_forces(). The longest stable step of all parts on all ranks, at most what is `left` [s].
 
@@ -78,7 +93,8 @@ def time_step(
     """
     signal = fluid.fastest_signal() if fluid else 0.0
     particle_dt, particle = solid.time_step() if solid else (np.inf, "")
-    wall_dt = coupling.time_step() if coupling else np.inf
+    with timers("geometry"):
+        wall_dt = coupling.time_step() if coupling else np.inf
     rates = np.array([signal / cfl, 1.0 / particle_dt, 1.0 / wall_dt, request])
     fluid_rate, solid_rate, wall_rate, strongest = communicator.maximum(rates)
     if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
@@ -94,22 +110,25 @@ def time_step(
     return TimeStep(dt, sub_steps, reason, Request(int(strongest)), signals, (1.0 / particle_dt, particle))
 
 
-def find_forces(solid: Structure | None, coupling: Coupling | None) -> None:
+def find_forces(solid: Structure | None, coupling: Coupling | None, timers: Timers) -> None:
     """Collective. Find each particle's neighbours and the forces between them."""
-    if coupling:
-        solid.prepare(coupling.reach, coupling.stray)
-    elif solid:
-        solid.prepare()
+    with timers("solid"):
+        if coupling:
+            solid.prepare(coupling.reach, coupling.stray)
+        elif solid:
+            solid.prepare()
 
 
-def make_step(fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, planned: TimeStep) -> TimeStep:
+def make_step(
+    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, planned: TimeStep, timers: Timers
+) -> TimeStep:
     """Collective. Make the planned step of the parts that there are. Raises Diverged."""
     if coupling:
-        return coupled_step(fluid, solid, coupling, planned)
-    return fluid_step(fluid, planned) if fluid else solid_step(solid, planned)
+        return coupled_step(fluid, solid, coupling, planned, timers)
+    return fluid_step(fluid, planned, timers) if fluid else solid_step(solid, planned, timers)
 
 
-def fluid_step(fluid: Fluid, planned: TimeStep) -> TimeStep:
+def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
     """Advance the fluid by one step; one that leaves no valid state is redone with half of it. Raises StepFailed."""
     dt = planned.dt
     for attempt in range(ATTEMPTS):
@@ -118,41 +137,59 @@ def fluid_step(fluid: Fluid, planned: TimeStep) -> TimeStep:
             dt *= 0.5
         fluid.begin_step()
         for stage in fluid.stages:  # Eq. 16
-            advance_stage(fluid, stage, dt)
-        if fluid.is_valid():
+            advance_stage(fluid, stage, dt, timers)
+        with timers("time step"):  # its signals are those of the next step
+            valid = fluid.is_valid()
+        if valid:
             return replace(planned, dt=dt, reason=Reason.REJECTED) if attempt else planned
     raise StepFailed(f"{ATTEMPTS} attempts failed, the last with a step of {dt:.3g} s")
 
 
-def solid_step(solid: Structure, planned: TimeStep) -> TimeStep:
+def solid_step(solid: Structure, planned: TimeStep, timers: Timers) -> TimeStep:
     """Advance the solid by one step."""
-    solid.advance(planned.dt)  # Eqs. 5-7
-    solid.migrate()
+    with timers("solid"):
+        solid.advance(planned.dt)  # Eqs. 5-7
+        solid.migrate()
     return planned
 
 
-def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeStep:
+def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: TimeStep, timers: Timers) -> TimeStep:
     """Advance fluid and solid together by one step."""
-    made = sub_cycle(solid, coupling, planned)  # Eqs. 5-7
-    coupling.update_geometry()
+    with timers("solid"):
+        made = sub_cycle(solid, coupling, planned)  # Eqs. 5-7
+    with timers("geometry"):
+        coupling.update_geometry()
     for stage in fluid.stages:  # Eq. 16
-        coupling.merge(stage)
-        advance_stage(fluid, stage, made.dt)
-        coupling.apply_wall_fluxes(stage, made.dt)
-    coupling.redistribute()
-    excess = solid.apply_impulse(coupling.transfer_impulse(made.dt))  # Eq. 34
-    coupling.account_work(excess)
-    solid.migrate()
+        with timers("merge"):
+            coupling.merge(stage)
+        advance_stage(fluid, stage, made.dt, timers)
+        with timers("flux"):
+            coupling.apply_wall_fluxes(stage, made.dt)
+    with timers("merge"):
+        coupling.redistribute()
+    with timers("forces"):
+        impulse = coupling.transfer_impulse(made.dt)
+    with timers("solid"):
+        excess = solid.apply_impulse(impulse)  # Eq. 34
+    with timers("forces"):
+        coupling.account_work(excess)
+    with timers("solid"):
+        solid.migrate()
     return made
 
 
-def advance_stage(fluid: Fluid, stage: Stage, dt: float) -> None:
+def advance_stage(fluid: Fluid, stage: Stage, dt: float, timers: Timers) -> None:
     """Advance the fluid by one Runge-Kutta stage; tiles that need no other rank are computed while messages travel."""
-    fluid.begin_stage(stage)
-    fluid.advance_tiles(fluid.ready_tiles, stage, dt)  # reconstruction, flux, update and relaxation: Eqs. 11-30
-    fluid.exchange.finish()
-    fluid.advance_tiles(fluid.waiting_tiles, stage, dt)
-    fluid.end_stage(stage)
+    with timers("exchange"):
+        fluid.start_exchange(stage)
+    with timers("stage"):  # reconstruction, flux, update and relaxation: Eqs. 11-30
+        fluid.begin_stage()
+        fluid.advance_tiles(fluid.ready_tiles, stage, dt)
+    with timers("exchange"):
+        fluid.exchange.finish()
+    with timers("stage"):
+        fluid.advance_tiles(fluid.waiting_tiles, stage, dt)
+        fluid.end_stage(stage)
 
 
 def sub_cycle(solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeStep:

@@ -30,8 +30,9 @@ PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 # Arrays that have other names now than in the table: {name in the table: name now}, for every case.
 RENAMED: dict[str, str] = {}
 
-# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work is no result.
-NO_RESULT = ("restart/scene", "balance.csv/")
+# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work, and how
+# long it takes, is no result.
+NO_RESULT = ("restart/scene", "balance.csv/", "performance.csv/")
 
 # A particle whose ball has no radius is none. Where it would point is not read, and depends on the particles that are
 # looked at together with it, and so on the number of ranks.

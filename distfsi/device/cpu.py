@@ -147,6 +147,12 @@ class Team:
     def finish_asynchronous(self) -> None:
         pass
 
+    def mark(self) -> float:
+        return clock.perf_counter()
+
+    def seconds_between(self, first: float, then: float) -> float:
+        return then - first
+
     def _share(self, function: Callable, count: int, *arguments) -> None:
         if self._pool is None or count < 2:
             if count:

@@ -111,3 +111,10 @@ class CupyRuntime:
 
     def synchronise(self, queue: Queue) -> None:
         self._streams[queue].synchronize()
+
+    def mark(self, queue: Queue) -> Any:
+        return self._streams[queue].record()
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        then.synchronize()
+        return 1e-3 * self._cupy.cuda.get_elapsed_time(first, then)

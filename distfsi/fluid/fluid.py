@@ -161,16 +161,19 @@ class Fluid:
         """Copies of what has left through the domain's sides, and of the number of limited faces."""
         return self._through.host().copy(), self._limited.host().copy()
 
+    def start_exchange(self, stage: Stage) -> None:
+        """Start to fill the ghost cells of the stage's input; `exchange.finish` ends it."""
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.start_exchange(stage)
         self.exchange.finish()
 
-    def begin_stage(self, stage: Stage) -> None:
-        """Find out which tiles are at rest, and start to exchange the ghosts of the stage's input."""
+    def begin_stage(self) -> None:
+        """Find out which tiles are at rest."""
         self.rest.begin_stage()
         self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
 
     def end_stage(self, stage: Stage) -> None:
         """After all tiles were advanced; after the last stage the state is that of the new time."""

@@ -125,13 +125,13 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
 
     with np.errstate(all="ignore"):
-        find_forces(solid, coupling)
+        find_forces(solid, coupling, simulation.timers)
         if fluid:
             fluid.fastest_signal()
         for part in (solid, coupling):
             if part:
                 part.time_step()
-        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, 2))
+        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, 2), simulation.timers)
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
