@@ -56,7 +56,7 @@ def velocity(time: np.ndarray, position: np.ndarray, window: tuple[float, float]
     return float(np.polyfit(time[inside], position[inside], 1)[0]) if covered and inside.sum() > 2 else np.nan
 
 
-def update_geometry(
+def follow(
     scene: Scene,
     communicator: Communicator,
     measure_of: Callable[[Simulation], Measure],
