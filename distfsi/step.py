@@ -19,7 +19,7 @@ from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.requests import Request
-from distfsi.scene.description import Scene
+from distfsi.scene.description import Scene, Time
 from distfsi.solid.protocol import Structure
 
 # Parts of a step by what is there, as timers count them; what is written and sampled between steps is "output".
@@ -49,6 +49,7 @@ class TimeStep:
 
     dt         [s]
     sub_steps  in how many equal parts a coupled solid takes it
+    start      when it begins [s]
     request    the strongest of what all ranks were asked for when it was planned
     signals    (local blocks,) fastest signals [1/s] of this rank's fluid before it
     particle   of this rank's particles the one that needs the shortest step: its rate [1/s], and why
@@ -56,6 +57,7 @@ class TimeStep:
 
     dt: float = 0.0
     sub_steps: int = 0
+    start: float = 0.0
     reason: Reason = Reason.START
     request: Request = Request.NOTHING
     signals: np.ndarray | None = None
@@ -83,10 +85,11 @@ def parts_of(scene: Scene) -> tuple[str, ...]:
 
 
 def time_step(
-    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, cfl: float, left: float, request: Request,
-    communicator: Communicator, timers: Timers,
+    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, time: float, limits: Time,
+    request: Request, communicator: Communicator, timers: Timers,
 ) -> TimeStep:  # fmt: skip
-    """Collective, after find_forces(). The longest stable step of all parts on all ranks, at most what is `left` [s].
+    """Collective, after find_forces(). The longest stable step of all parts on all ranks from `time` [s] on, within the
+    `limits` of the scene.
 
     `request`: what this rank is asked for; it rides in the same reduction. Raises Diverged on all ranks when a part has
     no valid state.
@@ -95,19 +98,19 @@ def time_step(
     particle_dt, particle = solid.time_step() if solid else (np.inf, "")
     with timers("geometry"):
         wall_dt = coupling.time_step() if coupling else np.inf
-    rates = np.array([signal / cfl, 1.0 / particle_dt, 1.0 / wall_dt, request])
+    rates = np.array([signal / limits.cfl, 1.0 / particle_dt, 1.0 / wall_dt, request])
     fluid_rate, solid_rate, wall_rate, strongest = communicator.maximum(rates)
     if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
         raise Diverged("there is no stable time step")
     most = coupling.sub_steps if coupling else 1
-    limits = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / most}
-    reason = max(limits, key=limits.__getitem__)
-    dt = 1.0 / limits[reason]
+    rate_of = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / most}
+    reason = max(rate_of, key=rate_of.__getitem__)
+    dt, left = 1.0 / rate_of[reason], limits.end - time
     if dt >= left:
         dt, reason = left, Reason.END
     sub_steps = max(1, math.ceil(dt * solid_rate * (1.0 - 1e-12)))
     signals = fluid.signals.copy() if fluid else None
-    return TimeStep(dt, sub_steps, reason, Request(int(strongest)), signals, (1.0 / particle_dt, particle))
+    return TimeStep(dt, sub_steps, time, reason, Request(int(strongest)), signals, (1.0 / particle_dt, particle))
 
 
 def find_forces(solid: Structure | None, coupling: Coupling | None, timers: Timers) -> None:
@@ -136,6 +139,7 @@ def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
             fluid.reject()
             dt *= 0.5
         fluid.begin_step()
+        fluid.average_sources(planned.start, dt)
         for stage in fluid.stages:  # Eq. 16
             advance_stage(fluid, stage, dt, timers)
         with timers("time step"):  # its signals are those of the next step
@@ -147,6 +151,7 @@ def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
 
 def solid_step(solid: Structure, planned: TimeStep, timers: Timers) -> TimeStep:
     """Advance the solid by one step."""
+    solid.body_force.average_over(planned.start, planned.dt)
     with timers("solid"):
         solid.advance(planned.dt)  # Eqs. 5-7
         solid.migrate()
@@ -159,6 +164,7 @@ def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: Ti
         made = sub_cycle(solid, coupling, planned)  # Eqs. 5-7
     with timers("geometry"):
         coupling.update_geometry()
+    fluid.average_sources(made.start, made.dt)
     for stage in fluid.stages:  # Eq. 16
         with timers("merge"):
             coupling.merge(stage)
@@ -208,5 +214,6 @@ def sub_cycle(solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeSt
             if done and not (solid_rate < SUB_STEP_SLACK and way + wall_rate < FARTHEST_MOVE / LARGEST_MOVE):
                 return replace(planned, dt=done * part, sub_steps=done, reason=Reason.SUB_STEPS)
             way += wall_rate
+        solid.body_force.average_over(planned.start + done * part, part)
         solid.advance(part)
     return planned

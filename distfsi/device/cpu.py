@@ -37,8 +37,8 @@ def build(
     for driver in drivers:
         text, numbers = emit.numba_text(driver, constants, bindings or {}, real, runtime.VERSION)
         module = _load(emit.module_name(driver, text), text)
-        numbers = tuple(map(np.dtype(real).type, numbers))
-        compiled[driver.__name__] = _Compiled(getattr(module, driver.__name__), Path(module.__file__), numbers)
+        dispatcher, numbers = getattr(module, driver.__name__), emit.Numbers(numbers, np.dtype(real).type)
+        compiled[driver.__name__] = _Compiled(dispatcher, Path(module.__file__), numbers)
     return SimpleNamespace(**compiled)
 
 
@@ -60,13 +60,13 @@ class _Compiled:
     """A driver and the `numbers` of a scene. It compiles at its first call, in one process of a machine at a time:
     others then find it on disk."""
 
-    def __init__(self, dispatcher: Callable, path: Path, numbers: tuple[np.floating, ...]):
+    def __init__(self, dispatcher: Callable, path: Path, numbers: emit.Numbers):
         self.dispatcher, self.path, self.numbers = dispatcher, path, numbers
         self._call: Callable = self._first_call
         self._lock = threading.Lock()
 
     def __call__(self, *arguments):
-        return self._call(*flat_values(arguments), *self.numbers)
+        return self._call(*flat_values(arguments), *self.numbers())
 
     def _first_call(self, *arguments):
         with self._lock:

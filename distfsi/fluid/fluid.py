@@ -137,6 +137,11 @@ class Fluid:
         """Where a stage leaves its state; asked before the stage."""
         return self._buffers[_output(stage.number)].device
 
+    def average_sources(self, start: float, dt: float) -> None:
+        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
+        if self.model.body_force.average_over(start, dt):
+            self.rest.wake()
+
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
         self._before = self._booked()

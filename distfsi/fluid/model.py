@@ -15,6 +15,7 @@ from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
+from distfsi.laws.body_force import BodyForce
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.laws.law import FluidEos
@@ -72,6 +73,7 @@ class FluidModel:
     bindings: dict[str, Bound]
     eos: tuple[PhaseFormulas, ...]
     dimensions: int
+    body_force: BodyForce
 
     @property
     def phases(self) -> int:
@@ -106,12 +108,13 @@ def fluid_model(scene: Scene) -> FluidModel:
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     curved = reconstructed is reconstruction.weno5
+    body_force = BodyForce(scene.sources, dimensions)
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
         "FLUXES": variables + more_fluxes,
-        "GRAVITY": scene.gravity,
+        "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
@@ -138,7 +141,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         owner = f"phase {k + 1}"
         bindings[f"reference_{k + 1}"] = Bound.of(phase.eos, "reference", owner)
         bindings[f"stored_reference_{k + 1}"] = _stored_reference(fluid, k, owner)
-    return FluidModel(constants, bindings, eos, dimensions)
+    return FluidModel(constants, bindings, eos, dimensions, body_force)
 
 
 def ghost_layers(scene: Scene) -> int:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from distfsi.device.interface import Columns
+from distfsi.laws.body_force import BodyForce
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.solid.neighbours import Near
@@ -58,6 +59,7 @@ class Structure(Protocol):
                them also bond_count, volume [m^D] and deformation
     dimensions D
     sub_steps  that have been made since the step began
+    body_force that of the sources, whose mean over a sub-step advance() takes
     start      (own, D) [m] positions when the step began
     before     (own, D) [m/s] velocities then
     carried    (own, D) [m/s] mean velocity since then
@@ -69,6 +71,7 @@ class Structure(Protocol):
     columns: Columns
     dimensions: int
     sub_steps: int
+    body_force: BodyForce
     start: Any
     before: Any
     carried: Any

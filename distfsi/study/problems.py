@@ -89,7 +89,7 @@ def in_rows(scene: Scene, rows: int) -> Scene:
     return replace(
         scene,
         domain=wide,
-        gravity=(*scene.gravity, 0.0),
+        sources=tuple(replace(source, acceleration=(*source.acceleration, 0.0)) for source in scene.sources),
         fluid=replace(fluid, regions=regions, inflow=(*fluid.inflow, (None, None))),
         performance=Performance(BLOCK_CELLS[1], TILE_CELLS[1]),
     )
