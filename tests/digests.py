@@ -35,8 +35,9 @@ RENAMED: dict[str, str] = {
     "history.csv/sealed mass_2 [kg]": "history.csv/trapped mass_2 [kg]",
 }
 
-# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work is no result.
-NO_RESULT = ("restart/scene", "balance.csv/")
+# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work, and how
+# long it takes, is no result.
+NO_RESULT = ("restart/scene", "balance.csv/", "performance.csv/")
 
 # A particle whose ball has no radius is none. Where it would point is not read, and depends on the particles that are
 # looked at together with it, and so on the number of ranks.

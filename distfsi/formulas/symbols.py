@@ -34,7 +34,7 @@ VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the vol
 FLUXES = Symbol(
     "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
 )
-GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
+BODY_FORCE = Symbol("body force per mass, one component per dimension [m/s2], the mean over the step")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
 OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega rho e")
 OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")

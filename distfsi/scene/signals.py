@@ -10,17 +10,11 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.scene.description import (
-    Body,
-    Compaction,
-    Domain,
-    Fluid,
-    FluidState,
-    LinearEos,
-    MieGrueneisen,
-    NoStrength,
-    Scene,
-)
+from distfsi.laws.solid.eos.compaction import Compaction
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
 
@@ -137,7 +131,7 @@ def fastest_signal(scene: Scene, layout: Layout) -> float:
 def moving_share(scene: Scene, layout: Layout) -> float:
     """Share of the fluid's tiles that compute, as the mean over the time of the run: a tile of one state rests until
     the first wave comes."""
-    if any(scene.gravity):
+    if scene.sources:
         return 1.0
     speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
     speed = max(speeds) if speeds else max(_sound(scene.fluid, state) for state in states(scene.fluid))

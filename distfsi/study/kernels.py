@@ -30,7 +30,8 @@ from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.scene.description import Scene
 from distfsi.scene.shipped import shipped_inputs
-from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
+from distfsi.simulation import Simulation
+from distfsi.step import TimeStep, find_forces, make_step
 
 REALS = ("float64", "float32")
 INPUTS = shipped_inputs()
@@ -126,24 +127,20 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     simulation = Simulation.of(scene, communicator, device=gpu)
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
 
-    def time_step() -> tuple[float, int]:
-        if solid:
-            solid.time_step()
-        if coupling:
-            coupling.time_step()
+    with np.errstate(all="ignore"):
+        find_forces(solid, coupling, simulation.timers)
         if fluid:
             fluid.fastest_signal()
-        return TIME_STEP, 2
-
-    step = coupled_step if coupling else fluid_step if fluid else solid_step
-    with np.errstate(all="ignore"):
-        step(*simulation.parts, time_step)
+        for part in (solid, coupling):
+            if part:
+                part.time_step()
+        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, 2), simulation.timers)
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
             coupling.absorb()
             coupling.trapped()
-            coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
+            coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)), TIME_STEP)
             coupling.wall.add_balls(
                 gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)
             )

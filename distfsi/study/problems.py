@@ -12,21 +12,13 @@ from functools import cache
 
 import numpy as np
 
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import of_kind, present
 from distfsi.scene import load
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
-from distfsi.scene.description import (
-    Ball,
-    BoundaryKind,
-    Box,
-    HalfSpace,
-    IdealGas,
-    Performance,
-    Scene,
-    Shape,
-    StiffenedGas,
-)
+from distfsi.scene.description import Ball, BoundaryKind, Box, HalfSpace, Performance, Scene, Shape
 from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.exact import PureState, RiemannSolution, exact_riemann
@@ -99,7 +91,7 @@ def in_rows(scene: Scene, rows: int) -> Scene:
     return replace(
         scene,
         domain=wide,
-        gravity=(*scene.gravity, 0.0),
+        sources=tuple(replace(source, acceleration=(*source.acceleration, 0.0)) for source in scene.sources),
         fluid=replace(fluid, regions=regions, inflow=(*fluid.inflow, (None, None))),
         performance=Performance(BLOCK_CELLS[1], TILE_CELLS[1]),
     )

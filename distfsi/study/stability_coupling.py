@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.errors import Diverged
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.scene.description import (
@@ -25,8 +27,6 @@ from distfsi.scene.description import (
     Fluid,
     FluidEos,
     FluidState,
-    LinearEos,
-    NoStrength,
     Output,
     Performance,
     Phase,

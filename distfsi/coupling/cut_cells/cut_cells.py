@@ -29,7 +29,7 @@ from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, u
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
@@ -79,7 +79,7 @@ class CutCells:
     causes = ("wall", "sides")
     reach = 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Structure, blocks: Blocks, team: Device):
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
@@ -177,7 +177,7 @@ class CutCells:
         self._forces.begin(self._band, self._groups, self._area)
         self._sides.choose()
 
-    def before_stage(self, stage: Stage) -> None:
+    def merge(self, stage: Stage) -> None:
         """Collective. Mix what belongs together in the stage's input, and leave it as states."""
         U, first = self.fluid.input_of(stage), stage.number == 0
         self._mix(U, self.wall.parts[0 if first else 1])
@@ -186,10 +186,9 @@ class CutCells:
         self.fluid.wake(self.wall.near.host() > 0)
         self._start, self._input, self._output = self.fluid.device_state, U, self.fluid.output_of(stage)
 
-    def after_stage(self, stage: Stage, dt: float) -> None:
+    def apply_wall_fluxes(self, stage: Stage, dt: float) -> None:
         """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
         rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
-        self._dt = dt
         rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
         boxes, forces = -(-self._faces.shape[0] // self.team.lanes), self._forces
         given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
@@ -200,11 +199,9 @@ class CutCells:
             forces.added, self.wall.shape, rates, stage.b, dt, weight,
         )  # fmt: skip
         self._sides.book(self._input, self._walls, rates, weights)
-        if stage is self.fluid.stages[-1]:
-            self._settle()
 
-    def _settle(self) -> None:
-        """Mix what the last stage left, and exchange volumes so that they stay near the geometric ones."""
+    def redistribute(self) -> None:
+        """Collective. Mix what the last stage left, and exchange volumes so that they stay near the geometric ones."""
         U, after, wall, k = self.fluid.device_state, self.wall.parts[1], self.wall, self.fluid_kernels
         self._mix(U, after)
         lists = [(cells, self._mixed(cells)) for cells in (self._band, self._loose)]
@@ -219,18 +216,19 @@ class CutCells:
                 self.team.run(k.put_mixed, cells.shape[0], cells, mixed, U, self._swept, wall.shape)
         self._near_ghosts.exchange((self.swept.device, self._swept_parity))
 
-    def transfer_impulse(self) -> Any:
-        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
+    def transfer_impulse(self, dt: float) -> Any:
+        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step of `dt` [s], on the
+        device."""
         given = self._forces.impulse_on(self.solid)
         paid = np.zeros((self.blocks.local_count, self._dimensions + 1))
-        self._dragged = self.drag(self._lone, given) if self._lone.shape[0] else paid
+        self._dragged = self.drag(self._lone, given, dt) if self._lone.shape[0] else paid
         return given
 
-    def drag(self, rows: Any, impulse: Any) -> np.ndarray:
-        """The fluid moves the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
-        found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
+    def drag(self, rows: Any, impulse: Any, dt: float) -> np.ndarray:
+        """The fluid moves the lone particles `rows` (n,) in the last step, of `dt` [s]: their rows of `impulse`
+        (own, D) [N s] are found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
         block, paid = self.dust.drag(
-            self.solid.columns, rows, self.solid.start, self._dt, impulse, (self.fluid.device_state, self._swept),
+            self.solid.columns, rows, self.solid.start, dt, impulse, (self.fluid.device_state, self._swept),
             self._input, self._kinds,
         )  # fmt: skip
         sums = np.zeros((self.blocks.local_count, self._dimensions + 1))

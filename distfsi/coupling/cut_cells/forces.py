@@ -15,7 +15,7 @@ from distfsi.coupling.kernels import spreading as push
 from distfsi.mesh.blocks import GHOSTS
 from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.rows import Groups, Rows
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 PARTICLE_DRIVERS = (
     cut_forces.find_momentum,
@@ -75,7 +75,7 @@ class WallForces:
         self._walled = self._wall.near_order(walled, self._rows.taken(band, walled), self._wall.blocks.shape)
         self._see(self._particles.velocity, self.velocity)
 
-    def impulse_on(self, solid: Solid) -> Any:
+    def impulse_on(self, solid: Structure) -> Any:
         """Collective, after the stages. Impulse (own, D) [N s] on this rank's particles, on the device."""
         team, own, wall = self._team, solid.count, self._wall
         known = (self._cell_volume, self.impulse, self.added, self._inertia, self._given, wall.shape)
@@ -87,7 +87,7 @@ class WallForces:
         team.run(self._kernels.push_together, own, *known, given, self._shared)
         return given
 
-    def pay(self, solid: Solid, excess: Any, joined: Any, U: Any, swept: Any, *company: Any) -> tuple[Any, Any]:
+    def pay(self, solid: Structure, excess: Any, joined: Any, U: Any, swept: Any, *company: Any) -> tuple[Any, Any]:
         """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
         velocity of the wall: the fluid in U and `swept` pays for it, cells for those that `joined` them. Returns what
         it has given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
@@ -122,7 +122,7 @@ class WallForces:
             amounts.reshape(-1), seen.middle, *seen.bins, wall.shape, wall.spacing, wall.origin,
         )  # fmt: skip
 
-    def _gather(self, solid: Solid) -> Any:
+    def _gather(self, solid: Structure) -> Any:
         """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
         its own."""
         own, wall, team, kernels = solid.count, self._wall, self._team, self._kernels

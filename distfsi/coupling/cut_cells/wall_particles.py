@@ -13,7 +13,7 @@ from distfsi.coupling.cut_cells.kernels import images
 from distfsi.coupling.cut_cells.thickness import Thickness
 from distfsi.coupling.cut_cells.wall_points import WallPoints
 from distfsi.mesh.particles import GhostPlan, ParticleExchange
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 MIRRORS = ("symmetry", "wall", "outflow", "inflow")
 DRIVERS = (
@@ -38,7 +38,7 @@ class WallParticles:
     thickness   of bodies (coupling/cut_cells/thickness.py)
     """
 
-    def __init__(self, solid: Solid, exchange: ParticleExchange, kernels: SimpleNamespace, wall: WallGeometry):
+    def __init__(self, solid: Structure, exchange: ParticleExchange, kernels: SimpleNamespace, wall: WallGeometry):
         """`kernels` holds DRIVERS."""
         grid = wall.blocks.grid
         self._solid, self._exchange, self._kernels, self._wall = solid, exchange, kernels, wall

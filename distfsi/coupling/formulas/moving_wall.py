@@ -11,8 +11,8 @@ from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_ch
 from distfsi.fluid.formulas.six_equation import phase_energies
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     DIMENSIONS,
-    GRAVITY,
     MINIMUM_FRACTION,
     OMEGA_1,
     OMEGA_2,
@@ -74,8 +74,8 @@ def stage_content(U_n, U, v_n, v, D, swept, b, dt):
     """
     Q_n, Q = with_energies(U_n, v_n), with_energies(U, v)
     rho = sum(Q[k] for k in static_range(PHASES))
-    force = tuple(dt * (GRAVITY[d] * rho) for d in static_range(DIMENSIONS))
-    work = dt * sum(GRAVITY[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
+    force = tuple(dt * (BODY_FORCE[d] * rho) for d in static_range(DIMENSIONS))
+    work = dt * sum(BODY_FORCE[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
     E = PHASES + DIMENSIONS
     transported = (
         *(Q_n[k] + b * (Q[k] - D[k] - Q_n[k]) for k in static_range(PHASES)),

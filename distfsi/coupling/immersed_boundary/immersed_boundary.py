@@ -21,7 +21,7 @@ from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 COVER_RADIUS = 1.5  # in cells, of the kernel that decides what is covered; at least three particle spacings
 VELOCITY_RADIUS = 1.4  # in cover radii, of the kernel between particles and cells; at most the ghost cells allow
@@ -49,7 +49,7 @@ FLUID_DRIVERS = (
 )
 
 
-class Coupling:
+class ImmersedBoundary:
     """What the solid covers of the fluid's grid, the state of the covered cells, and the forces across the wall.
 
     reach   [m]: how far the solid's ghosts and images must go
@@ -61,7 +61,7 @@ class Coupling:
     causes = ("wall", "covered", "fresh", "sides")
     sub_steps, stray = 1, 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Structure, blocks: Blocks, team: Device):
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
@@ -166,7 +166,7 @@ class Coupling:
             position, *bins, self._shape, self._widths, self._origin,
         )  # fmt: skip
 
-    def before_stage(self, stage: Stage) -> None:
+    def merge(self, stage: Stage) -> None:
         """Collective. Give the covered cells of the stage's input, and before the first stage the fresh ones, their
         states (Eqs. 31, 32)."""
         self.fluid.exchange_ghosts(stage)
@@ -182,7 +182,7 @@ class Coupling:
             self._run(k.find_contents, self._fresh, U, self._shape, content)
             self._ledger["fresh"] += self._per_block(kinds.FRESH_CELLS, content) * self._cell_volume
 
-    def after_stage(self, stage: Stage, dt: float) -> None:
+    def apply_wall_fluxes(self, stage: Stage, dt: float) -> None:
         """Add up what has crossed the wall in a stage of a step of `dt` [s], with the fluxes of that stage (Eqs. 33,
         35)."""
         weights = self.team.array(stage.weight * dt * self._cell_volume / self._spacing)
@@ -191,8 +191,12 @@ class Coupling:
         self._run(self.fluid_kernels.collect_wall, self._covered, self._passed, *rest)
         self._run(self.fluid_kernels.collect_sides, *self._sides, self._through_sides.device, *rest)
 
-    def transfer_impulse(self) -> Any:
-        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
+    def redistribute(self) -> None:
+        """No cell shares its content with others."""
+
+    def transfer_impulse(self, dt: float) -> Any:
+        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step of `dt` [s], on the
+        device."""
         D, own, team = self._dimensions, self.solid.count, self.team
         wall = (self._covered, self._passed, self._velocity, self._inertia)
         self._run(self.fluid_kernels.spread, *wall, self._kick, self._shape)
