@@ -601,6 +601,10 @@ def arithmetic_of_numbers(x):
     return x * (1.0 / GAMMA) + (GAMMA - 1.0) * -GAMMA / 2.0
 
 
+def ratio_of_numbers(x):
+    return x * (GAMMA / GAMMA) + (HALF / GAMMA - 1.0) * x
+
+
 def choice_by_a_number(x):
     y = x if GAMMA > 1.0 else -x
     if GAMMA:
@@ -640,6 +644,10 @@ def test_arithmetic_among_numbers_is_done_once_in_double():
     emission = emit.Emission({"GAMMA": 3.0}, {})
     emission.add(arithmetic_of_numbers)
     assert emission.numbers == {"(1.0 / GAMMA)": 1.0 / 3.0, "(((GAMMA - 1.0) * -GAMMA) / 2.0)": -3.0}
+
+
+def test_a_number_over_itself_is_one():
+    assert body_of(ratio_of_numbers, GAMMA=3.0) == ["return x + numbers_[0] * x"]
 
 
 def test_numbers_decide_at_run_time_but_for_zero():

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, ClassVar
 
 NEEDED = object()  # the default of what the input must give
@@ -56,9 +57,26 @@ class Law:
 
 
 class FluidEos(Law):
-    """The pressure of a fluid."""
+    """The pressure of a fluid: p = reference(rho) + omega(rho) rho e, e [J/kg] counted from where the law likes.
+
+    What a law gives, as formulas for kernels but for the last:
+
+      reference(rho)          pressure without energy [Pa], and its slope with density [m2/s2]
+      grueneisen(rho)         omega, and its slope with density [m3/kg]
+      shifted_reference(rho)  if float32 asks for it: the reference to energies counted from that at REST_DENSITY and
+                              without pressure
+      cold_curve(rho)         pressure [Pa] and energy [J/kg] of the coldest state
+
+    closed_form  whether phases relax along the hyperbola of fluid/formulas/relaxation.py; else it is fitted
+    """
 
     folder = "fluid"
+    closed_form: ClassVar[bool] = False
+
+    @property
+    def maximum_density(self) -> float:
+        """No state of the fluid is as dense [kg/m3]."""
+        return inf
 
 
 class SolidEos(Law):

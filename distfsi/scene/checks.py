@@ -43,7 +43,7 @@ from distfsi.scene.schema import (
     Sections,
 )
 from distfsi.scene.shapes import bounding_box, contains
-from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
+from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
@@ -123,7 +123,11 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
         elif not least <= state.volume_fraction <= 1.0 - least:
             yield Fault((*path, "volume_fraction"), f"expected {least:g} to 1 - {least:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
-    cold_pressure, cold_energy, _ = cold_curve(phase.eos, state.density)
+    if state.density >= phase.eos.maximum_density:
+        text = f"too high: '{phase.name}' has states below {phase.eos.maximum_density:.6g} kg/m3 only"
+        yield Fault((*path, "density"), text)
+        return
+    cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
