@@ -10,8 +10,7 @@ from collections.abc import Container, Iterator, Mapping
 import numpy as np
 from scipy.spatial import cKDTree
 
-from distfsi.laws.solid.eos.compaction import Compaction
-from distfsi.laws.solid.strength.concrete import Concrete
+from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
     Ball,
@@ -191,8 +190,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
-    if isinstance(body.eos, Compaction) != isinstance(body.strength, Concrete):
-        yield Fault((*path, "strength"), "'concrete' and the eos 'compaction' need each other")
+    if (pair := _lone_partner(body)) is not None:
+        yield Fault((*path, "strength"), "'{}' and the eos '{}' need each other".format(*pair))
+
+
+def _lone_partner(body: Body) -> tuple[str, str] | None:
+    """Words of a strength and an EOS that need each other, if the body has but one of them."""
+    strength, eos = word_of(type(body.strength)), word_of(type(body.eos))
+    pairs = ((body.eos.partner or strength, eos), (strength, body.strength.partner or eos))
+    return next((pair for pair in pairs if pair != (strength, eos)), None)
 
 
 def _cut_off_axis(shape: Shape, domain: Domain) -> bool:
