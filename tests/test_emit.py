@@ -131,6 +131,11 @@ def calls_a_constant(x):
     return x * slope + level
 
 
+def drops_a_constant(x):
+    level, slope = constant_pair(x)
+    return x + slope
+
+
 def scaled(x):
     return GAMMA * x
 
@@ -209,6 +214,10 @@ def test_a_callee_that_returns_a_constant_is_inlined():
     assert body_of(calls_a_constant, **constants) == ["return numbers_[0]"]
     assert both(calls_a_constant, 1.0, constants=constants) == -2.0
     assert "constant_pair" not in text_of(calls_a_constant, constants).split("def calls_a_constant")[1]
+
+
+def test_numbers_that_vanish_are_not_given():
+    assert both(drops_a_constant, 1.0, constants={"GAMMA": 4.0}) == 1.0
 
 
 def test_bound_formulas_keep_their_own_constants():
