@@ -9,7 +9,10 @@ from distfsi.coupling.formulas import moving_wall
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.stage import HALVINGS
-from distfsi.scene import thermodynamics
+from distfsi.mesh.communicator import Communicator
+from distfsi.scene import load, thermodynamics
+from distfsi.simulation import Simulation
+from distfsi.study.problems import centers, fields
 from fluids import AIR, TRACE, model_of
 from independent import Material
 
@@ -138,3 +141,19 @@ def _check_wall(law, material, rho, p):
             approach = np.sqrt((p_wall - p) * (1.0 / rho - 1.0 / behind))
         tolerance = 1e-8 * rho * c * abs(approach) if law.closed_form else 0.02 * abs(p_wall - p)
         assert wall_pressure(U, W, approach) == pytest.approx(p_wall, abs=tolerance + 1e-8 * p)
+
+
+def check_tube(path, exact, interface, limits):
+    """Two states that meet at `interface` in the input at `path`, at its end: the errors of density, velocity and
+    pressure, each over its range, stay below `limits` and halve with the cells as those of shocks and contacts do."""
+    errors = []
+    for cells in (100, 200):
+        simulation = Simulation.of(load(path, [f"domain.cells={cells}"]), Communicator(), 1)
+        while not simulation.done:
+            simulation.step()
+        found, x = fields(simulation), centers(simulation)[0]
+        values = found["density"][0, 0], found["velocity"][0, 0, :, 0], found["pressure"][0, 0]
+        expected = exact.sample((x - interface) / simulation.time)
+        errors.append([np.abs(a - b).mean() / np.ptp(b) for a, b in zip(values, expected, strict=True)])
+    assert np.all(np.array(errors[1]) < limits), errors
+    assert np.all(np.array(errors[1]) < 0.65 * np.array(errors[0])), errors
