@@ -18,6 +18,7 @@ from distfsi.device.timers import Timers
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene, Time
 from distfsi.solid.protocol import Structure
@@ -67,7 +68,7 @@ class TimeStep:
         """Collective, before the next step. What set the step: if the fluid did, where it was fastest and how fast; if
         the solid did, which particle and why."""
         if self.reason is Reason.FLUID:
-            cells = communicator.allgather(fluid.fastest_cell(self.signals))
+            cells = communicator.allgather(present(fluid).fastest_cell(present(self.signals)))
             return f"{self.reason}, {max(cells, key=lambda cell: (cell[0], *cell[1]))[2]}"
         return self.name_particle(communicator) if self.reason is Reason.SOLID else str(self.reason)
 
@@ -117,7 +118,7 @@ def find_forces(solid: Structure | None, coupling: Coupling | None, timers: Time
     """Collective. Find each particle's neighbours and the forces between them."""
     with timers("solid"):
         if coupling:
-            solid.prepare(coupling.reach, coupling.stray)
+            present(solid).prepare(coupling.reach, coupling.stray)
         elif solid:
             solid.prepare()
 
@@ -127,8 +128,8 @@ def make_step(
 ) -> TimeStep:
     """Collective. Make the planned step of the parts that there are. Raises Diverged."""
     if coupling:
-        return coupled_step(fluid, solid, coupling, planned, timers)
-    return fluid_step(fluid, planned, timers) if fluid else solid_step(solid, planned, timers)
+        return coupled_step(present(fluid), present(solid), coupling, planned, timers)
+    return fluid_step(fluid, planned, timers) if fluid else solid_step(present(solid), planned, timers)
 
 
 def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:

@@ -1,12 +1,13 @@
 """Sources: what accelerates everything alike, as one body force that kernels get as numbers at run time."""
 
+import ast
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from distfsi.device.cpu import Team
-from distfsi.device.emit import numba_text
+from distfsi.device.emit import Emission
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostRuntime
 from distfsi.device.markers import driver
@@ -44,7 +45,10 @@ def fall(begin, end, dt, velocity):
 def text_with(*sources):
     """Of the stage's kernel in two dimensions."""
     model = model_of("air", dimensions=2, sources=sources)
-    return numba_text(advance_tiles, model.constants, model.bindings, "float64", "")
+    emission = Emission(model.constants, model.bindings)
+    emission.root(advance_tiles)
+    text = "\n".join(ast.unparse(tree) for _, tree in emission.functions.values())
+    return text, tuple(emission.numbers.values())
 
 
 def test_without_a_source_kernels_know_of_none():

@@ -111,6 +111,8 @@ class Emission:
             whole = ast.Tuple([ast.Name(name, ast.Load()) for name in names], ast.Load())
             tree.body.insert(0, ast.Assign([ast.Name(NUMBERS, ast.Store())], whole))
             ast.fix_missing_locations(tree)
+        else:
+            self.numbers.clear()  # only formulas that nobody calls asked for some
         return callee.name
 
     def _constant(self, function: Callable, scope: Bound | None, suffix: str, name: str) -> ast.expr:

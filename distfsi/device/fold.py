@@ -448,7 +448,7 @@ class Fold(ast.NodeTransformer):
 
     @staticmethod
     def identity(node: ast.BinOp) -> ast.expr | None:
-        """x + 0, 0 + x, x - 0, 0 - x, x * 0, x * 1, 0 / x, x / 1 without their second operand."""
+        """x + 0, 0 + x, x - 0, 0 - x, x * 0, x * 1, 0 / x, x / 1 without their second operand; 1 for N / N."""
 
         def is_(side: ast.expr, value: float) -> bool:
             return isinstance(side, ast.Constant) and not isinstance(side.value, bool) and side.value == value
@@ -466,6 +466,8 @@ class Fold(ast.NodeTransformer):
             return right if is_(left, 1) else left
         if op is ast.Div and (is_(left, 0) or is_(right, 1)):
             return left
+        if op is ast.Div and isinstance(left, Number) and isinstance(right, Number) and left.id == right.id:
+            return ast.copy_location(ast.Constant(1.0), node)
         return None
 
     def visit_UnaryOp(self, node: ast.UnaryOp):

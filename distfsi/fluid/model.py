@@ -5,9 +5,7 @@ A new equation of state is one file in laws/fluid/.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -16,8 +14,6 @@ from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
-from distfsi.laws.fluid.jwl import Jwl
-from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.laws.law import FluidEos
 from distfsi.scene.description import Fluid, Scene
 
@@ -37,32 +33,6 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 
 @dataclass(frozen=True)
-class PhaseFormulas:
-    """p = reference(rho) + omega rho e of a phase, outside the kernels."""
-
-    eos: FluidEos
-
-    @property
-    def omega(self) -> float:
-        """Grueneisen coefficient."""
-        return self.eos.omega if isinstance(self.eos, Jwl) else self.eos.gamma - 1.0
-
-    @property
-    def closed_form(self) -> bool:
-        """Whether the reference pressure is constant."""
-        return not isinstance(self.eos, Jwl)
-
-    def evaluate(self, rho: float) -> tuple[float, float]:
-        """Reference pressure [Pa] and its slope with density."""
-        return self._reference(rho)
-
-    @cached_property
-    def _reference(self) -> Callable[[float], tuple[float, float]]:
-        bound = Bound.of(self.eos, "reference")
-        return plain(bound.function, bound.constants)
-
-
-@dataclass(frozen=True)
 class FluidModel:
     """Everything the fluid's kernels are specialised with, and the meaning of its variables.
 
@@ -71,7 +41,7 @@ class FluidModel:
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
-    eos: tuple[PhaseFormulas, ...]
+    eos: tuple[FluidEos, ...]
     dimensions: int
     body_force: BodyForce
 
@@ -96,14 +66,15 @@ class FluidModel:
 
     def formula(self, name: str):
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        return plain(self.bindings[name].function, self.constants, self.bindings)
+        bound = self.bindings[name]
+        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
 
 
 def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
     fluid: Fluid = scene.fluid
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
-    eos = tuple(PhaseFormulas(phase.eos) for phase in fluid.phases)
+    eos = tuple(phase.eos for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
@@ -123,7 +94,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "CURVED": curved,
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
-    } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
+    }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
     if constants["FINISHES"]:
@@ -137,10 +108,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
     bindings |= {name: Bound(function) for name, function in solver}
-    for k, phase in enumerate(fluid.phases):
-        owner = f"phase {k + 1}"
-        bindings[f"reference_{k + 1}"] = Bound.of(phase.eos, "reference", owner)
-        bindings[f"stored_reference_{k + 1}"] = _stored_reference(fluid, k, owner)
+    for k, phase in enumerate(fluid.phases, 1):
+        bindings |= {f"{name}_{k}": Bound.of(phase.eos, name, f"phase {k}") for name in ("reference", "grueneisen")}
+        bindings[f"stored_reference_{k}"] = _stored_reference(fluid, k)
     return FluidModel(constants, bindings, eos, dimensions, body_force)
 
 
@@ -149,11 +119,12 @@ def ghost_layers(scene: Scene) -> int:
     return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
 
 
-def _stored_reference(fluid: Fluid, k: int, owner: str) -> Bound:
-    """In float32 the energies of a stiffened gas are counted from those of its first state without pressure."""
-    eos = fluid.phases[k].eos
-    first = next((region.state for region in fluid.regions if region.state.phase == k), None)
-    if fluid.precision == "float32" and isinstance(eos, StiffenedGas) and first is not None:
+def _stored_reference(fluid: Fluid, k: int) -> Bound:
+    """The reference to the energies of phase k that cells hold: in float32 those of the laws that can are counted from
+    the phase's first state without pressure."""
+    eos, owner = fluid.phases[k - 1].eos, f"phase {k}"
+    first = next((region.state for region in fluid.regions if region.state.phase == k - 1), None)
+    if fluid.precision == "float32" and hasattr(eos, "shifted_reference") and first is not None:
         bound = Bound.of(eos, "shifted_reference", owner)
         return replace(bound, constants={**bound.constants, "REST_DENSITY": first.density})
     return Bound.of(eos, "reference", owner)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, ClassVar
 
 NEEDED = object()  # the default of what the input must give
@@ -53,19 +54,48 @@ def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     return field(metadata={"entry": Entry(meaning, None, limits, default)})
 
 
+@dataclass(frozen=True)
 class Law:
-    """A law of any kind; `folder` in laws/ holds those of its kind."""
+    """A law of any kind; `folder` in laws/ holds those of its kind.
+
+    partner  word of the other law that a body needs with this one: a solid's EOS with a strength, or the reverse
+    """
 
     folder: ClassVar[str]
+    partner: ClassVar[str | None] = None
 
     def check(self) -> None:
         """Raise ValueError, in words for the user, where fields do not go together."""
 
 
 class FluidEos(Law):
-    """The pressure of a fluid."""
+    """The pressure of a fluid: p = reference(rho) + omega(rho) rho e, e [J/kg] counted from where the law likes.
+
+    A law may also have shifted_reference(rho), for float32: the reference to energies counted from that at REST_DENSITY
+    and without pressure.
+
+    closed_form  whether phases relax along the hyperbola of fluid/formulas/relaxation.py; else it is fitted
+    """
 
     folder = "fluid"
+    closed_form: ClassVar[bool] = False
+
+    def reference(self, rho: float) -> tuple[float, float]:
+        """A formula for kernels: the pressure without energy [Pa], and its slope with density [m2/s2]."""
+        raise NotImplementedError
+
+    def grueneisen(self, rho: float) -> tuple[float, float]:
+        """A formula for kernels: the coefficient omega, and its slope with density [m3/kg]."""
+        raise NotImplementedError
+
+    def cold_curve(self, rho: float) -> tuple[float, float]:
+        """Pressure [Pa] and energy [J/kg] of the coldest state, for checks of the input."""
+        raise NotImplementedError
+
+    @property
+    def maximum_density(self) -> float:
+        """No state of the fluid is as dense [kg/m3]."""
+        return inf
 
 
 class SolidEos(Law):
@@ -73,11 +103,21 @@ class SolidEos(Law):
 
     folder = "solid/eos"
 
+    def rest_bulk_modulus(self, density: float) -> float:
+        """Bulk modulus [Pa] at rest, where the material has this density [kg/m3]."""
+        raise NotImplementedError
+
+    def behind_shock(self, u: float) -> tuple[float, float]:
+        """By how much sound is faster [m/s] behind a shock of particle velocity u, and the volume there over that in
+        front of it, as far as it is known."""
+        return 0.0, 1.0
+
 
 class Strength(Law):
-    """How a solid resists a change of its shape."""
+    """How a solid resists a change of its shape, with `shear_modulus` [Pa] at rest."""
 
     folder = "solid/strength"
+    shear_modulus: float
 
 
 class Failure(Law):

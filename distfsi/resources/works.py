@@ -11,6 +11,7 @@ import numpy as np
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
@@ -32,7 +33,7 @@ BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressu
 
 def gases(
     cells: tuple[int, ...],
-    eos: tuple[scene.FluidEos, ...],
+    eos: tuple[FluidEos, ...],
     inner: tuple[float, float],
     outer: tuple[float, float],
     precision: Precision = "float64",
@@ -106,7 +107,7 @@ def _endless(domain: scene.Domain, fluid: scene.Fluid | None, solid: scene.Solid
     D = domain.dimensions
     performance = scene.Performance(BLOCK_CELLS[D - 1], TILE_CELLS[D - 1])
     time, output = scene.Time(np.inf, 0.5, None), scene.Output("", 0.0, 1)
-    return scene.Scene("bench", domain, time, (0.0,) * D, fluid, solid, output, performance)
+    return scene.Scene("bench", domain, time, fluid, solid, output, performance)
 
 
 TWO_GASES = (HELIUM, AIR), (0.138, 1.0), (1.0, 2.0)

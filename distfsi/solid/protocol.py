@@ -32,7 +32,7 @@ class SolidForm(Protocol):
     def requested_keys(self, columns: Columns, /) -> np.ndarray | None:
         """Keys (n,) of particles and images that this rank needs wherever they are; None: of none."""
 
-    def ghost_payload(self, columns: Columns, /) -> list:
+    def ghost_payload(self, columns: Columns, /) -> list[Any]:
         """What ghosts and images must bring besides the state: pairs of an array (own, k) of the device and its
         parities, or "position". It comes back, of `count` particles, in `Near.ghost_payload`."""
 

@@ -10,6 +10,8 @@ class Compaction(SolidEos):
     """Concrete, with strength `concrete`: elastic to the crush point, pores closing up to the lock pressure, then dense
     with p = K1 x + K2 x^2 + K3 x^3, x = (rho/rho0 - 1 - lock_strain)/(1 + lock_strain)."""
 
+    partner = "concrete"
+
     crush_pressure: float = quantity("Pa", "pressure at which pores begin to close", above=0.0)
     crush_strain: float = number("rho/rho0 - 1 there", above=0.0)
     lock_pressure: float = quantity("Pa", "pressure at which all pores are closed", above=0.0)
@@ -22,3 +24,7 @@ class Compaction(SolidEos):
         """The crush point comes first."""
         if self.crush_pressure >= self.lock_pressure or self.crush_strain >= self.lock_strain:
             raise ValueError("the crush point must lie below the lock point")
+
+    def rest_bulk_modulus(self, density: float) -> float:
+        """Bulk modulus [Pa] of the elastic part."""
+        return self.crush_pressure / self.crush_strain

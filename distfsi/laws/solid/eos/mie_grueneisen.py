@@ -18,3 +18,11 @@ class MieGrueneisen(SolidEos):
     s3: float = number("third coefficient", default=0.0)
     gamma0: float = number("Grueneisen coefficient")
     a: float = number("its change with compression", default=0.0)
+
+    def rest_bulk_modulus(self, density: float) -> float:
+        """Bulk modulus [Pa] at rest."""
+        return density * self.c0**2
+
+    def behind_shock(self, u: float) -> tuple[float, float]:
+        """By how much sound is faster behind a shock U = c0 + s1 u, and the volume there over that in front of it."""
+        return (2.0 * self.s1 - 1.0) * u, 1.0 - u / (self.c0 + self.s1 * u)

@@ -13,6 +13,8 @@ class Concrete(Strength):
     Plastic and compacted strain over max(D1 (p* + T*)^D2, least_failure_strain) sum up to the wear.
     """
 
+    partner = "compaction"
+
     shear_modulus: float = quantity("Pa", "shear modulus G", above=0.0)
     compressive_strength: float = quantity("Pa", "uniaxial compressive strength f_c", above=0.0)
     tensile_strength: float = quantity("Pa", "largest tension T; a `failure` takes its place", above=0.0)

@@ -8,3 +8,5 @@ from distfsi.laws.law import Strength
 @dataclass(frozen=True)
 class NoStrength(Strength):
     """No deviatoric stress."""
+
+    shear_modulus = 0.0
