@@ -27,7 +27,8 @@ from launch import ROOT, run_ranks
 TABLE = Path(__file__).with_suffix(".json")
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
-# Arrays that have other names now than in the table: {name in the table: name now}, for every case.
+# Arrays that have other names now than in the table: {name in the table: name now}, for every case. Two names this file
+# uses itself, those of the balls and of the ids of particles: they must be changed below too.
 RENAMED: dict[str, str] = {}
 
 # The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work is no result.
