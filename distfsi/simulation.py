@@ -12,7 +12,7 @@ import numpy as np
 import psutil
 
 from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
 from distfsi.diagnostics.gauges import Gauge, gauge_of
@@ -27,7 +27,8 @@ from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 from distfsi.solid.solid import Solid
 
-COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": Coupling}
+COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": ImmersedBoundary}
+Coupling = CutCells | ImmersedBoundary
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 
 FLUID_LIMIT = "fluid CFL"
@@ -67,13 +68,15 @@ def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: Time
     """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
     solid.prepare(coupling.reach, coupling.stray)
     dt = sub_cycle(solid, coupling, *time_step())  # Eqs. 5-7
-    coupling.update_geometry()
+    geometry = coupling.update_geometry()
     for stage in fluid.stages:
-        coupling.before_stage(stage)
+        cells = coupling.merge(geometry, stage)
         fluid.advance_stage(stage, dt)
-        coupling.after_stage(stage, dt)
-    excess = solid.apply_impulse(coupling.transfer_impulse())  # Eq. 34
-    coupling.account_work(excess)
+        coupling.apply_wall_fluxes(geometry, cells, stage, dt)
+    coupling.redistribute(geometry)
+    transfer = coupling.transfer_impulse(geometry, cells, dt)
+    excess = solid.apply_impulse(transfer.impulse)  # Eq. 34
+    coupling.account_work(geometry, transfer, excess)
     solid.migrate()
     return dt
 

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary as Coupling
 from distfsi.coupling.kernels.cells import COVERED
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.regions import source_cell
