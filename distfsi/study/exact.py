@@ -30,6 +30,9 @@ _RELATIVE = 4 * np.finfo(float).eps
 _TINY = np.finfo(float).tiny
 
 
+Values = float | np.ndarray  # one number or many
+
+
 @dataclass(frozen=True)
 class PureState:
     """State of one material: density [kg/m3], pressure [Pa], velocity along the line [m/s]."""
@@ -65,7 +68,7 @@ class Material:
         """Pressure that an expansion tends to as the density goes to zero [Pa]."""
         return -self.eos.p_inf if isinstance(self.eos, StiffenedGas) else 0.0
 
-    def reference(self, density):
+    def reference(self, density: Values) -> tuple[Values, Values, Values]:
         """Pressure [Pa], its slope [m2/s2] and internal energy [J/kg] on the isentrope K = 0."""
         match self.eos:
             case IdealGas():
@@ -77,22 +80,22 @@ class Material:
                 a, b = A * np.exp(-R1 * v), B * np.exp(-R2 * v)
                 return a + b, (R1 * a + R2 * b) * v / density, (a / R1 + b / R2) / rho0
 
-    def energy(self, density, pressure):
+    def energy(self, density: Values, pressure: Values) -> Values:
         """Specific internal energy [J/kg]."""
         p_ref, _, e_ref = self.reference(density)
         return e_ref + (pressure - p_ref) / (self.omega * density)
 
-    def sound_speed(self, density, pressure):
+    def sound_speed(self, density: Values, pressure: Values) -> Values:
         """Isentropic sound speed [m/s]."""
         p_ref, slope, _ = self.reference(density)
         return np.sqrt(slope + (1.0 + self.omega) * (pressure - p_ref) / density)
 
-    def isentrope(self, start: PureState, density):
+    def isentrope(self, start: PureState, density: Values) -> Values:
         """Pressure at `density` on the isentrope through `start` [Pa]."""
         p_ref, p_ref_start = self.reference(density)[0], self.reference(start.density)[0]
         return p_ref + (start.pressure - p_ref_start) * (density / start.density) ** (1.0 + self.omega)
 
-    def expansion_velocity(self, start: PureState, density):
+    def expansion_velocity(self, start: PureState, density: Values) -> Values:
         """Integral of c d(rho)/rho along the isentrope from `density` up to `start` [m/s].
 
         Gauss's rule in rho^(w/2), in which c d(rho)/rho is constant for ideal and stiffened gas and smooth for JWL.
@@ -109,7 +112,7 @@ class Material:
         V0, e0 = 1.0 / ahead.density, self.energy(ahead.density, ahead.pressure)
 
         def hugoniot(V: float) -> float:
-            return self.energy(1.0 / V, pressure) - e0 - 0.5 * (pressure + ahead.pressure) * (V0 - V)
+            return float(self.energy(1.0 / V, pressure) - e0) - 0.5 * (pressure + ahead.pressure) * (V0 - V)
 
         return 1.0 / brentq(hugoniot, V0 * self.omega / (2.0 + self.omega), V0, xtol=_TINY, rtol=_RELATIVE)
 
@@ -117,7 +120,7 @@ class Material:
         """Density where the isentrope through `start` has `pressure`, lower or by a trace higher [kg/m3]."""
 
         def mismatch(rho: float) -> float:
-            return self.isentrope(start, rho) - pressure
+            return float(self.isentrope(start, rho)) - pressure
 
         return brentq(mismatch, 1e-60 * start.density, 1.001 * start.density, xtol=_TINY, rtol=_RELATIVE)
 
@@ -235,7 +238,8 @@ def _fan(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, speed: Arr
     material = Material(eos)
 
     def state_at(rho: Array) -> tuple[Array, Array]:
-        return ahead.velocity - direction * material.expansion_velocity(ahead, rho), material.isentrope(ahead, rho)
+        velocity = ahead.velocity - direction * material.expansion_velocity(ahead, rho)
+        return np.asarray(velocity), np.asarray(material.isentrope(ahead, rho))
 
     def mismatch(rho: Array, speed: Array) -> Array:
         u, p = state_at(rho)

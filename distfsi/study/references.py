@@ -303,7 +303,7 @@ radial Lagrangian computation (Godunov, exact interfaces, 2000 cells per metre; 
 the highest pressure by 1 %)."""
 
 
-class Place(NamedTuple):
+class CentreAt(NamedTuple):
     """Where a body's centre is at a time, in the units of its input."""
 
     time: float
@@ -311,6 +311,6 @@ class Place(NamedTuple):
     y: float
 
 
-LIFTOFF = (Place(0.1641, 0.3602, 0.0830), Place(0.30085, 0.6400, 0.1459))
+LIFTOFF = (CentreAt(0.1641, 0.3602, 0.0830), CentreAt(0.30085, 0.6400, 0.1459))
 """The cylinder of inputs/liftoff.toml by an independent ghost-cell method of first order in the force, h = 0.0025; the
 mass is 1.2 % less."""

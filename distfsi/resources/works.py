@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
+from distfsi.narrowing import present
 from distfsi.scene import description as scene
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
 
+Precision = Literal["float64", "float32"]
 AIR, HELIUM, WATER = scene.IdealGas(1.4), scene.IdealGas(1.67), scene.StiffenedGas(4.4, 6e8)
 TNT = scene.Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
 COPPER = scene.MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
@@ -19,7 +22,11 @@ BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressu
 
 
 def gases(
-    cells: tuple[int, ...], eos: tuple, inner: tuple[float, float], outer: tuple[float, float], precision="float64"
+    cells: tuple[int, ...],
+    eos: tuple[scene.FluidEos, ...],
+    inner: tuple[float, float],
+    outer: tuple[float, float],
+    precision: Precision = "float64",
 ) -> scene.Scene:
     """A ball of one material (density, pressure) in another, in a closed box; the standard fluid work."""
     D = len(cells)
@@ -61,7 +68,7 @@ def blast_on_plates(cells: int, dimensions: int, side: float, count: int, pitch:
         for n in range(count)
         for body in _cube((low + n * pitch, *across), (2.0,) + (side,) * (dimensions - 1)).bodies
     ]
-    return replace(one, solid=replace(one.solid, bodies=tuple(plates)))
+    return replace(one, solid=replace(present(one.solid), bodies=tuple(plates)))
 
 
 def bursting_ball() -> scene.Scene:
@@ -70,8 +77,8 @@ def bursting_ball() -> scene.Scene:
     eos, strength = scene.LinearEos(3.25e9), scene.PerfectlyPlastic(0.7e9, 2e7)
     rest, shape = (0.0,) * 3, scene.Ball((0.0,) * 3, 0.4)
     ball = scene.Body("ball", shape, 0.1, 2000.0, rest, eos, strength, None, failure, radial_velocity=300.0)
-    sides = (("outflow", "outflow"),) * 2 + (("symmetry", "outflow"),)
-    domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, sides)
+    free: tuple[scene.BoundaryKind, scene.BoundaryKind] = ("outflow", "outflow")
+    domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, (free, free, ("symmetry", "outflow")))
     return _endless(domain, None, scene.Solid((ball,), SMOOTHING, 1.0, 2.0))
 
 
