@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,7 +24,9 @@ class CellSort:
     strides  (3,) those of the last window, on the host
     """
 
-    def __init__(self, kernels: SimpleNamespace, device: Device, lower: np.ndarray, upper: np.ndarray):
+    def __init__(
+        self, kernels: SimpleNamespace, device: Device, lower: Sequence[float], upper: Sequence[float]
+    ) -> None:
         """`kernels` holds DRIVERS."""
         self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
         self._lower, self._upper = np.array(lower), np.array(upper)

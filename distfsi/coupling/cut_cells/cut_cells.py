@@ -23,12 +23,14 @@ from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.fluid.initial import InitialState
+from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels.particles import EXCHANGE
 from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.particles import ParticleExchange
+from distfsi.narrowing import present
 from distfsi.scene.description import Scene
 from distfsi.solid.solid import Solid
 
@@ -67,14 +69,16 @@ class CutCells:
     causes = ("wall", "sides")
     reach = 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(
+        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Solid, blocks: Blocks, device: Device
+    ) -> None:
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
-        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
+        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         self._staircase = scene.coupling.scheme == "stairs"
         self._particles = SolidParticles(solid)
         self._cell_volume = float(np.prod(grid.spacing))
-        self._initial = InitialState(scene.fluid, model)
+        self._initial = InitialState(present(scene.fluid), model)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
@@ -88,37 +92,37 @@ class CutCells:
         passage = self._wall_particles.find(position)
         self._lone.find(passage.middle, passage.bins)
         for _ in ("before", "after"):
-            self._wall_particles.cut(passage, position, team.zeros(position.shape))
+            self._wall_particles.cut(passage, position, device.zeros(position.shape))
         self._fill_at_start()
 
     def _build(self, scene: Scene) -> None:
         """The kernels, and who uses them."""
-        blocks, team, model, grid = self.blocks, self.team, self.model, self.blocks.grid
-        coarsest = max(body.spacing for body in scene.solid.bodies)
-        self.wall = WallGeometry(blocks, team, coarsest, self._rest.dtype.type, self._staircase)
+        blocks, device, model, grid = self.blocks, self.team, self.model, self.blocks.grid
+        coarsest = max(body.spacing for body in present(scene.solid).bodies)
+        self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
         constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
         constants |= {"LANES": self.wall.lanes, "TRANSFERRED": 1 + grid.dimensions}
-        of_particles = team.build(PARTICLE_DRIVERS, constants)
-        of_fluid = team.build(
-            FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
+        of_particles = device.build(PARTICLE_DRIVERS, constants)
+        of_fluid = device.build(
+            FLUID_DRIVERS, model.constants | {"LANES": device.lanes}, model.bindings, present(scene.fluid).precision
         )
-        ghosts = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
-        exchange = ParticleExchange(blocks, team, of_particles)
+        ghosts = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
+        exchange = ParticleExchange(blocks, device, of_particles)
         self._rows = exchange.rows
         self._merging = CellMerging(self.wall, ghosts, of_particles, scene.time.cfl)
         self._redistribution = Redistribution(model, self.wall, self._merging, self._rows, of_fluid, self._rest)
         self._wall_particles = WallParticles(self._particles, exchange, of_particles, self.wall)
         self._lone = LoneParticles(self._particles, self._rows, self.wall, of_particles, of_fluid)
-        self._fluxes = BandFluxes(model, self.wall.grid, team, self._rows, of_fluid)
+        self._fluxes = BandFluxes(model, self.wall.grid, device, self._rows, of_fluid)
         self._forces = WallForces(self._particles, self.wall, self._merging, self._rows, of_particles, of_fluid)
-        self._sides = Sides(self.fluid, model.conserved, self.wall.grid, team, of_fluid)
+        self._sides = Sides(self.fluid, model.conserved, self.wall.grid, device, of_fluid)
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Conserved state (variables,) of the first region without its velocity."""
-        state = self._initial.of(scene.fluid.regions[0].state)
+        state = self._initial.of(present(scene.fluid).regions[0].state)
         rest = np.array(self.model.formula("primitives")(state))
         rest[self.model.phases : self.model.phases + self._dimensions] = 0.0
-        return np.array(self.model.formula("conserved")(tuple(rest)), dtype=scene.fluid.precision)
+        return np.array(self.model.formula("conserved")(tuple(rest)), dtype=present(scene.fluid).precision)
 
     def _fill_at_start(self) -> None:
         """Cut cells hold the state at the middle of their open nodes; fluid fills what is open."""
@@ -203,7 +207,7 @@ class CutCells:
         """Advance the cells of the band in the place of the fluid's stage, in a step of `dt` [s], to contents."""
         times = StageTimes(stage.b, dt, stage.weight * dt)
         self._fluxes.advance(geometry, cells, times)
-        self._sides.book(geometry.sides, cells.input.U, geometry.walls, dt, times.weight)
+        self._sides.account(geometry.sides, cells.input.U, geometry.walls, dt, times.weight)
 
     def redistribute(self, geometry: CutGeometry) -> None:
         """Collective. Contents that the last stage left become states; volumes come nearer to the geometric ones."""
@@ -245,7 +249,7 @@ class CutCells:
 
     def pressure(self, dt: float) -> float:
         """Collective. The highest mean pressure [Pa] on a cell's wall in the last step, of `dt` [s]."""
-        pressures = self._forces.pressures(self.geometry)
+        pressures = self._forces.pressures(present(self.geometry))
         highest = self._rows.largest(pressures, 0.0) / dt
         return float(self.blocks.communicator.maximum(np.array([highest]))[0])
 
@@ -313,7 +317,7 @@ class CutCells:
         return counts.astype(float)
 
     def snapshot(self) -> Snapshot:
-        """What a restart needs: the volumes, and the books."""
+        """What a restart needs: the volumes, and the budget."""
         return {
             "cells": {"fluid_volume": self.blocks.without_ghosts(self.fluid_volume.host()[:, :1])},
             "sums": {"wall": self._wall_sums, "sides": self._sides.passed.host()},

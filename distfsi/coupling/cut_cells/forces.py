@@ -47,14 +47,14 @@ class WallForces:
         fluid_kernels: SimpleNamespace,
     ):
         """`particle_kernels`, `fluid_kernels`: PARTICLE_DRIVERS and FLUID_DRIVERS as built."""
-        blocks, self._team, self._grid = wall.blocks, wall.team, wall.grid
+        blocks, self._device, self._grid = wall.blocks, wall.device, wall.grid
         self._particles, self._wall, self._merging, self._rows = particles, wall, merging, rows
         self._kernels, self._fluid_kernels = particle_kernels, fluid_kernels
-        grid, array = blocks.grid, wall.team.array
+        grid, array = blocks.grid, wall.device.array
         self._D, self._cell_volume, self._table = (
             grid.dimensions,
             float(np.prod(grid.spacing)),
-            blocks.table_on(wall.team),
+            blocks.table_on(wall.device),
         )
         self._transfer = array(blocks.allocate(1 + self._D))
         self._parity = array(np.append(1 << np.arange(self._D), 0))
@@ -64,10 +64,10 @@ class WallForces:
     def begin(self, band: Band, motion: WallMotion) -> tuple[Exchange, Any]:
         """What fluid and wall exchange in a step, nothing at first, and with which velocity the wall moves in the cells
         of the band; which of these it passes through, as places in the band."""
-        team, n, D = self._team, band.cells.shape[0], self._D
-        sums = (team.zeros((n, D)), team.zeros(n), team.zeros((n, D)), team.zeros(n), team.zeros(n))
-        exchange, mark = Exchange(*sums), team.empty(n, np.int8)
-        team.run(self._kernels.mark_walled, n, band.area, mark)
+        device, n, D = self._device, band.cells.shape[0], self._D
+        sums = (device.zeros((n, D)), device.zeros(n), device.zeros((n, D)), device.zeros(n), device.zeros(n))
+        exchange, mark = Exchange(*sums), device.empty(n, np.int8)
+        device.run(self._kernels.mark_walled, n, band.area, mark)
         walled = self._rows.marked(mark)[1]
         walled = self._wall.near_order(walled, self._rows.taken(band.cells, walled), self._wall.blocks.shape)
         self._interpolate(band.cells, walled, motion, motion.velocity, exchange.velocity, exchange.inertia)
@@ -76,33 +76,39 @@ class WallForces:
     def impulse_on(self, geometry: CutGeometry) -> tuple[Any, Any]:
         """Collective, after the stages. Impulse (own, D) [N s] on this rank's particles; and the velocity (own, D)
         [m/s] per added mass of fluid that goes along with light ones."""
-        team, own, p, band, motion = self._team, self._particles.count, self._particles, geometry.band, geometry.motion
+        device, own, p, band, motion = (
+            self._device,
+            self._particles.count,
+            self._particles,
+            geometry.band,
+            geometry.motion,
+        )
         known = (band.cells, geometry.exchange, self._transfer, self._grid)
-        team.run(self._fluid_kernels.find_transfer, band.cells.shape[0], *known)
+        device.run(self._fluid_kernels.find_transfer, band.cells.shape[0], *known)
         self._merging.ghosts.exchange((self._transfer, self._parity))
-        impulse, shared = (team.empty((own, self._D)) for _ in ("impulse", "shared"))
+        impulse, shared = (device.empty((own, self._D)) for _ in ("impulse", "shared"))
         moving = (motion.own_mass, p.fixed, p.before, p.velocity, self._spread(motion))
-        team.run(self._kernels.push_together, own, *moving, impulse, shared)
+        device.run(self._kernels.push_together, own, *moving, impulse, shared)
         return impulse, shared
 
     def correct(self, geometry: CutGeometry, excess: Any, shared: Any, states: States) -> tuple[np.ndarray, np.ndarray]:
         """Collective, after solid.apply_impulse(): the energy correction. The fluid pays for the velocity at which
         impulses worked over that of the wall, `excess` (own, D) [m/s]; `shared` as of impulse_on(). Returns what it has
         given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
-        team, own, D, k = self._team, self._particles.count, self._D, self._kernels
+        device, own, D, k = self._device, self._particles.count, self._D, self._kernels
         band, exchange, n = geometry.band, geometry.exchange, geometry.band.cells.shape[0]
         # what cells see of the gains
-        vector, gains = tuple((a,) for a in range(D)), team.empty((own, 2 * D + 1))
-        team.run(k.find_gains, own, self._particles.carried, excess, shared, gains)
+        vector, gains = tuple((a,) for a in range(D)), device.empty((own, 2 * D + 1))
+        device.run(k.find_gains, own, self._particles.carried, excess, shared, gains)
         (gains,) = geometry.motion.passage.plan.exchange([(gains, (*vector, *vector, ()))])
-        seen, paid = team.zeros((n, 2 * D + 1)), team.empty(n)
+        seen, paid = device.zeros((n, 2 * D + 1)), device.empty(n)
         self._interpolate(band.cells, geometry.walled, geometry.motion, gains, seen, exchange.inertia)
         # merge targets pay
         correction = self._transfer.reshape(-1)
-        team.run(k.find_corrections, n, band.cells, exchange, seen, correction, self._grid)
+        device.run(k.find_corrections, n, band.cells, exchange, seen, correction, self._grid)
         self._merging.ghosts.exchange((self._transfer, self._parity))
         known = (geometry.merging, correction, paid, states, self._grid)
-        team.run(self._fluid_kernels.correct_energy, n, band.cells, *known)
+        device.run(self._fluid_kernels.correct_energy, n, band.cells, *known)
         given = (exchange.impulse, exchange.work, paid)
         impulse, work, extra = (self._cell_volume * geometry.lists.blocks.sums(amounts) for amounts in given)
         return impulse, work[:, 0] + extra[:, 0]
@@ -110,34 +116,34 @@ class WallForces:
     def pressures(self, geometry: CutGeometry) -> Any:
         """Mean pressure times the time [Pa s] on the wall in each cell of the band, (n,) on the device."""
         n = geometry.band.cells.shape[0]
-        pressure = self._team.empty(n)
-        self._team.run(self._kernels.find_pressures, n, geometry.band.area, geometry.exchange.impulse, pressure)
+        pressure = self._device.empty(n)
+        self._device.run(self._kernels.find_pressures, n, geometry.band.area, geometry.exchange.impulse, pressure)
         return pressure
 
     def _interpolate(self, band: Any, walled: Any, motion: WallMotion, values: Any, mean: Any, inertia: Any) -> None:
         """mean (band, k) of what particles have (count, k) around the cells with a wall, where they were in the middle
         of the step: only there is the way that a turning wall went along itself."""
         (count, width), wall = values.shape, self._wall
-        amounts = self._team.empty((count, 1 + width))
-        self._team.run(self._kernels.find_momentum, count, width, motion.mass, values, amounts)
+        amounts = self._device.empty((count, 1 + width))
+        self._device.run(self._kernels.find_momentum, count, width, motion.mass, values, amounts)
         particles = Cloud(motion.passage.middle, amounts, motion.passage.bins)
         boxes, known = -(-walled.shape[0] // wall.lanes), (width, mean, inertia, wall.seen, particles, self._grid)
-        self._team.run(self._kernels.interpolate, boxes, band, walled, *known)
+        self._device.run(self._kernels.interpolate, boxes, band, walled, *known)
 
     def _spread(self, motion: WallMotion) -> Any:
         """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
         its own."""
-        own, wall, team, k, middle = (
+        own, wall, device, k, middle = (
             self._particles.count,
             self._wall,
-            self._team,
+            self._device,
             self._kernels,
             motion.passage.own_middle,
         )
-        gained, home = team.empty((own, 1 + self._D)), team.empty(own, np.int64)
+        gained, home = device.empty((own, 1 + self._D)), device.empty(own, np.int64)
         chosen = wall.coarse_order(middle, self._particles.id_on_device)
-        team.run(k.find_homes, own, self._particles.start, home, self._grid, self._table)
+        device.run(k.find_homes, own, self._particles.start, home, self._grid, self._table)
         given = (wall.seen, self._merging.mark, BAND, self._transfer, self._seen_cells)
         receivers = Receivers(middle, home, motion.image)
-        team.run(k.spread, -(-own // wall.lanes), chosen, receivers, *given, gained, self._grid)
+        device.run(k.spread, -(-own // wall.lanes), chosen, receivers, *given, gained, self._grid)
         return gained

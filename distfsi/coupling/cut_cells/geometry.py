@@ -87,16 +87,17 @@ class WallGeometry:
     reach      [m]: how far from this rank's blocks particles change them
     """
 
-    def __init__(self, blocks: Blocks, team: Device, spacing: float, real: type, staircase: bool):
+    def __init__(self, blocks: Blocks, device: Device, spacing: float, real: type, staircase: bool):
         """`spacing` [m] of the coarsest particles; `staircase`: cells are open as a whole or not at all."""
-        self.blocks, self.team, self.grid, D = blocks, team, blocks.grid_on(team), blocks.grid.dimensions
-        self.lanes, self._staircase = min(team.lanes, NEAR_LANES), staircase
+        self.blocks, self.device, self.grid, D = blocks, device, blocks.grid_on(device), blocks.grid.dimensions
+        self.lanes, self._staircase = min(device.lanes, NEAR_LANES), staircase
         constants = {"DIMENSIONS": D, "LANES": self.lanes, "GHOSTS": blocks.grid.ghost_layers}
-        self.kernels: SimpleNamespace = team.build((*DRIVERS, *(STAIRCASE if staircase else ())), constants)
-        self._rows = Rows(team, self.kernels)
-        self._cells = search.CellSort(self.kernels, team, blocks.grid.lower[:D], blocks.grid.upper[:D])
+        self.kernels: SimpleNamespace = device.build((*DRIVERS, *(STAIRCASE if staircase else ())), constants)
+        self._rows = Rows(device, self.kernels)
+        self._cells = search.CellSort(self.kernels, device, blocks.grid.lower[:D], blocks.grid.upper[:D])
+        self._layers = blocks.grid.ghost_layers
         self._choose_lengths(blocks.grid.spacing[:D], spacing)
-        self._profile = team.array(plane_profile(D))
+        self._profile = device.array(plane_profile(D))
         self._allocate(real)
 
     def _choose_lengths(self, cell: Sequence[float], spacing: float) -> None:
@@ -108,23 +109,23 @@ class WallGeometry:
         self._inflation = Inflation(self.radius, sphere, *shares)
         self._search = max(self.radius, sphere + 1.05 * h)
         off = 0.75 * h if self._staircase else 0.25 * h  # how far particles may be from where cells are closed
-        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, sphere) + off), 2.25 * h)
-        self.reach = 2.5 * h + self._search  # two ghost cells, and half a cell that the wall may go in a step
+        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, sphere) + off), (self._layers + 0.25) * h)
+        self.reach = (self._layers + 0.5) * h + self._search  # half a cell that the wall may go in a step
         touching, apart, aside = (part * max(0.5 * h, spacing) for part in (TOUCHING, APART, ASIDE))
         self.ranges = ImageRange(touching, apart, aside, self._search + 0.5 * h)
         self._search_cell = 0.5 * min(cell)
 
     def _allocate(self, real: type) -> None:
         """The fields, of cells that are all open."""
-        blocks, team, D = self.blocks, self.team, self.blocks.grid.dimensions
+        blocks, device, D = self.blocks, self.device, self.blocks.grid.dimensions
         count = blocks.local_count
-        old, new = (DualArray(team, np.ones((count, 1, *blocks.shape), real)) for _ in ("old", "new"))
+        old, new = (DualArray(device, np.ones((count, 1, *blocks.shape), real)) for _ in ("old", "new"))
         self.fractions = (old, new)
-        old, new = (DualArray(team, np.ones((count, D, *blocks.shape), real)) for _ in ("old", "new"))
+        old, new = (DualArray(device, np.ones((count, D, *blocks.shape), real)) for _ in ("old", "new"))
         self.apertures = (old, new)
-        self.near = DualArray(team, np.ones(count, dtype=np.uint8))
+        self.near = DualArray(device, np.ones(count, dtype=np.uint8))
         nodes = tuple(n + (1 if axis < D else 0) for n, axis in zip(blocks.shape, (2, 1, 0), strict=True))
-        self._distance = DualArray(team, np.full((count, *nodes), self.radius))
+        self._distance = DualArray(device, np.full((count, *nodes), self.radius))
         self._node_rows = count * prod(nodes[:2])
         self.rows_per_block = prod(blocks.shape[:2])  # of cells along x
 
@@ -143,25 +144,25 @@ class WallGeometry:
         near each other follow each other. Where one is computed at a time the order does not matter."""
         if self.lanes == 1:
             return values
-        row, x = np.divmod(self.team.download(at), shape[2])
+        row, x = np.divmod(self.device.download(at), shape[2])
         layer, y = np.divmod(row, shape[1])
         brick = (layer // 2 * shape[1] + y // 2) * shape[2] + x // 2
-        return self.team.array(self.team.download(values)[np.argsort(brick, kind="stable")])
+        return self.device.array(self.device.download(values)[np.argsort(brick, kind="stable")])
 
     # ---- thin bodies ------------------------------------------------------------------------------------------------
 
     def fill(self, own: int, chosen: Any, points: Cloud) -> Any:
         """Share of the broad kernel around each of the first `own` points that is filled, and the mean way [m] to what
         fills it, (own, 1 + D). `chosen` (m,): all own points and maybe others, as of coarse_order()."""
-        filled, boxes = self.team.empty((own, 1 + self.blocks.grid.dimensions)), -(-chosen.shape[0] // self.lanes)
-        self.team.run(self.kernels.fill_kernel, boxes, filled, chosen, self.radius, points)
+        filled, boxes = self.device.empty((own, 1 + self.blocks.grid.dimensions)), -(-chosen.shape[0] // self.lanes)
+        self.device.run(self.kernels.fill_kernel, boxes, filled, chosen, self.radius, points)
         return filled
 
     def inflate(self, own: int, filled: Any, chosen: Any, points: Cloud) -> Any:
         """Spheres (own, 2 + D) as which points of thin bodies count (coupling/cut_cells/kernels/inflation.py); `filled`
         of all, `chosen` as for fill()."""
-        sphere, boxes = self.team.empty((own, 2 + self.blocks.grid.dimensions)), -(-chosen.shape[0] // self.lanes)
-        self.team.run(self.kernels.inflate, boxes, sphere, filled.reshape(-1), chosen, self._inflation, points)
+        sphere, boxes = self.device.empty((own, 2 + self.blocks.grid.dimensions)), -(-chosen.shape[0] // self.lanes)
+        self.device.run(self.kernels.inflate, boxes, sphere, filled.reshape(-1), chosen, self._inflation, points)
         return sphere
 
     # ---- cutting ----------------------------------------------------------------------------------------------------
@@ -171,12 +172,12 @@ class WallGeometry:
         ones; their spheres (n, 2 + D) and keys (n,)."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
         run, k, distance, count = (
-            self.team.run,
+            self.device.run,
             self.kernels,
             self._distance.device.reshape(-1),
             points.position.shape[0],
         )
-        mark = self.team.empty(count, np.int8)
+        mark = self.device.empty(count, np.int8)
         run(k.mark_inflated, count, sphere, points.values, mark)
         inflated, rows = self._rows.marked(mark)
         nodes = self._nodes_near(self._search if inflated else self.radius, points.bins)
@@ -189,9 +190,9 @@ class WallGeometry:
     def _nodes_near(self, reach: float, bins: Bins) -> Any:
         """The nodes (n,) that may have particles within `reach` [m]; the others are open."""
         near, distance = self.near.device, self._distance.device.reshape(-1)
-        self.team.run(self.kernels.find_near, self.blocks.local_count, near, reach, bins, self.grid)
-        mark, rows = self.team.zeros(distance.shape[0], np.int8), self._node_rows
-        self.team.run(self.kernels.mark_nodes, rows, near, distance, mark, self.radius, reach, bins, self.grid)
+        self.device.run(self.kernels.find_near, self.blocks.local_count, near, reach, bins, self.grid)
+        mark, rows = self.device.zeros(distance.shape[0], np.int8), self._node_rows
+        self.device.run(self.kernels.mark_nodes, rows, near, distance, mark, self.radius, reach, bins, self.grid)
         nodes = self._rows.marked(mark)[1]
         return self.near_order(nodes, nodes, self._distance.device.shape[1:])
 
@@ -200,14 +201,14 @@ class WallGeometry:
         bins, boxes = self._cells.sort(position, key, 2.0 * self._search_cell)[1], -(-nodes.shape[0] // self.lanes)
         distance, largest = self._distance.device.reshape(-1), self._inflation.largest
         particles = Cloud(position, sphere, bins)
-        self.team.run(self.kernels.add_spheres, boxes, nodes, distance, largest, self._search, particles, self.grid)
+        self.device.run(self.kernels.add_spheres, boxes, nodes, distance, largest, self._search, particles, self.grid)
 
     def _open(self) -> None:
         """Find the new fractions and apertures from the distances."""
-        run, k, near, blocks = self.team.run, self.kernels, self.near.device, self.blocks.local_count
+        run, k, near, blocks = self.device.run, self.kernels, self.near.device, self.blocks.local_count
         (before, after), (_, aperture) = self.flat_fractions, self.flat_apertures
         rows = blocks * self.rows_per_block
-        is_cut = self.team.empty(rows, np.int8)
+        is_cut = self.device.empty(rows, np.int8)
         distance = self._distance.device.reshape(-1)
         run(k.find_fractions, rows, near, distance, before, after, aperture, is_cut, self.grid)
         if self._staircase:

@@ -42,7 +42,7 @@ class LoneParticles:
         """`particle_kernels`, `fluid_kernels`: PARTICLE_DRIVERS and FLUID_DRIVERS as built."""
         self._particles, self._rows, self._device, self._wall = particles, rows, rows.device, wall
         self._kernels, self._fluid_kernels = particle_kernels, fluid_kernels
-        self._grid, self._table = wall.grid, wall.blocks.table_on(wall.team)
+        self._grid, self._table = wall.grid, wall.blocks.table_on(wall.device)
         self._fewest = FEWEST[wall.blocks.grid.dimensions]
         particles.attach("lone", np.full(particles.count, 0), shown=True)
 

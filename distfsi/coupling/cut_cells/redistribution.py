@@ -49,13 +49,13 @@ class Redistribution:
         rest: np.ndarray,
     ):
         """`kernels` holds DRIVERS; rest (variables,): conserved state of covered cells."""
-        team, blocks = wall.team, wall.blocks
-        self._model, self._team, self._grid, self._merging = model, team, wall.grid, merging
-        self._rows, self._kernels, self._rest = rows, kernels, team.array(rest)
+        device, blocks = wall.device, wall.blocks
+        self._model, self._device, self._grid, self._merging = model, device, wall.grid, merging
+        self._rows, self._kernels, self._rest = rows, kernels, device.array(rest)
         self.fields = VOLUME_FIELDS if model.phases == 2 else 1
-        self.volume = DualArray(team, np.ones((blocks.local_count, self.fields, *blocks.shape), rest.dtype))
+        self.volume = DualArray(device, np.ones((blocks.local_count, self.fields, *blocks.shape), rest.dtype))
         mirrors = (model.mirror, np.full(self.fields, -1))
-        self._parities = [team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0))) for axes in mirrors]
+        self._parities = [device.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0))) for axes in mirrors]
 
     def states(self, U: Any) -> States:
         """The fluid of all cells, in a field U of states."""
@@ -67,33 +67,33 @@ class Redistribution:
 
     def take_contents(self, band: Any, states: States) -> Contents:
         """States of the `band` (n,) become contents."""
-        self._team.run(self._kernels.take_contents, band.shape[0], band, states, self._grid)
+        self._device.run(self._kernels.take_contents, band.shape[0], band, states, self._grid)
         return Contents(*states)
 
     def keep_volumes(self, band: Any, states: States, volume: Any) -> None:
         """volume (n,) = fluid volume fractions of the band's cells."""
-        self._team.run(self._kernels.keep_volumes, band.shape[0], band, states, volume, self._grid)
+        self._device.run(self._kernels.keep_volumes, band.shape[0], band, states, volume, self._grid)
 
     # ---- absorption of isolated cells -------------------------------------------------------------------------------
 
     def any_absorbed(self, band: Any, kind: Any) -> bool:
         """Whether isolated cells of this rank have receivers."""
-        mark = self._team.empty(band.shape[0], np.int8)
-        self._team.run(self._kernels.mark_absorbed, band.shape[0], band, mark, kind, self._merging.target, self._grid)
+        mark = self._device.empty(band.shape[0], np.int8)
+        self._device.run(self._kernels.mark_absorbed, band.shape[0], band, mark, kind, self._merging.target, self._grid)
         return self._rows.any(mark)
 
     def absorb(self, band: Any, contents: Contents, walls: Walls) -> None:
         """Collective. Contents of isolated cells move to their receivers."""
         self.exchange_ghosts(contents)
-        moved = self._team.empty((band.shape[0], self._model.variables + 3), contents.Q.dtype)
+        moved = self._device.empty((band.shape[0], self._model.variables + 3), contents.Q.dtype)
         known = (contents, walls.kind, walls.old_fraction, self._merging.target, self._grid)
-        self._team.run(self._kernels.absorb, band.shape[0], band, moved, *known)
-        self._team.run(self._kernels.put_moved, band.shape[0], band, moved, contents, self._grid)
+        self._device.run(self._kernels.absorb, band.shape[0], band, moved, *known)
+        self._device.run(self._kernels.put_moved, band.shape[0], band, moved, contents, self._grid)
 
     def trapped(self, band: Any, states: States, kind: Any) -> Any:
         """Masses per volume (n, phases) [kg/m3] of isolated cells of the band, 0 of the others."""
-        held = self._team.empty((band.shape[0], self._model.phases))
-        self._team.run(self._kernels.find_trapped, band.shape[0], band, held, states, kind, self._grid)
+        held = self._device.empty((band.shape[0], self._model.phases))
+        self._device.run(self._kernels.find_trapped, band.shape[0], band, held, states, kind, self._grid)
         return held
 
     # ---- redistribution ---------------------------------------------------------------------------------------------
@@ -101,9 +101,9 @@ class Redistribution:
     def redistribute(self, lists: CellLists, contents: Contents, fraction: Any, merging: Merging) -> States:
         """Collective. Contents of the band become states of what is merged; covered cells rest. Merged cells share
         their volume as their open `fraction` is."""
-        run, k, band = self._team.run, self._kernels, lists.band
+        run, k, band = self._device.run, self._kernels, lists.band
         self.exchange_ghosts(contents)
-        new, boxes = self._new_states(band), -(-band.shape[0] // self._team.lanes)
+        new, boxes = self._new_states(band), -(-band.shape[0] // self._device.lanes)
         run(k.redistribute, boxes, band, new, contents, fraction, merging, self._grid)
         states = States(*contents)
         run(k.put_states, band.shape[0], band, new, states, self._grid)
@@ -113,7 +113,7 @@ class Redistribution:
     def exchange_volumes(self, lists: CellLists, states: States, walls: Walls, expands: bool) -> None:
         """Collective. Fluid volume fractions come nearer to the open ones; what is missing in whole cells their fluid
         fills itself, if it `expands`."""
-        run, k = self._team.run, self._kernels
+        run, k = self._device.run, self._kernels
         both = [(cells, self._new_states(cells)) for cells in (lists.band, lists.uneven)]
         for _ in range(ROUNDS):
             self.exchange_ghosts(states)
@@ -130,4 +130,4 @@ class Redistribution:
 
     def _new_states(self, cells: Any) -> Any:
         """Room for states and volumes of a list of cells."""
-        return self._team.empty((cells.shape[0], self._model.variables + 1), self.volume.dtype)
+        return self._device.empty((cells.shape[0], self._model.variables + 1), self.volume.dtype)

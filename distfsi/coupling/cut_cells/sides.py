@@ -15,7 +15,7 @@ from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.kernels.grid import BlockGrid
 
-DRIVERS = (cut_fluxes.book_sides,)
+DRIVERS = (cut_fluxes.account_sides,)
 
 
 class Sides:
@@ -26,9 +26,9 @@ class Sides:
             has not
     """
 
-    def __init__(self, fluid: Fluid, conserved: int, grid: BlockGrid, team: Device, kernels: SimpleNamespace):
+    def __init__(self, fluid: Fluid, conserved: int, grid: BlockGrid, device: Device, kernels: SimpleNamespace):
         """`kernels` holds DRIVERS; `conserved`: how many amounts a cell has."""
-        self._grid, self._kernels, self._team, self._blocks = grid, kernels, team, fluid.blocks
+        self._grid, self._kernels, self._device, self._blocks = grid, kernels, device, fluid.blocks
         blocks = fluid.blocks
         cells = np.arange(blocks.local_count * prod(blocks.shape)).reshape(-1, *blocks.shape)
         found, sides = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
@@ -38,16 +38,16 @@ class Sides:
                 if origin[axis] + side * extent[axis] == side * blocks.grid.cells[axis]:
                     found.append(active.take(-side, axis=2 - axis).ravel())
                     sides.append(np.full(len(found[-1]), 2 * axis + side))
-        cell, side = np.concatenate(found), np.concatenate(sides)
+        cell, ends = np.concatenate(found), np.concatenate(sides)
         self._block = cell // prod(blocks.shape)
-        self.cells, self._side = team.array(cell), team.array(side)
-        self.passed = DualArray(team, np.zeros((len(side), conserved)))
+        self.cells, self._side = device.array(cell), device.array(ends)
+        self.passed = DualArray(device, np.zeros((len(ends), conserved)))
 
-    def book(self, chosen: Any, U: Any, walls: Walls, dt: float, weight: float) -> None:
+    def account(self, chosen: Any, U: Any, walls: Walls, dt: float, weight: float) -> None:
         """Add what a stage with the input U gets wrong at the rows `chosen` (m,) of the cells, those in the band; `dt`
         [s] of the step, `weight` [s]: that times the stage's share."""
         given = (chosen, self.cells, self._side, self.passed.device, U, walls, dt, weight, self._grid)
-        self._team.run(self._kernels.book_sides, chosen.shape[0], *given)
+        self._device.run(self._kernels.account_sides, chosen.shape[0], *given)
 
     def sums(self) -> np.ndarray:
         """`passed` of this rank's blocks (local blocks, conserved)."""

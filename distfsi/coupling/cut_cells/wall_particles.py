@@ -43,17 +43,17 @@ class WallParticles:
         grid = wall.blocks.grid
         self._particles, self._exchange, self._kernels, self._wall = particles, exchange, kernels, wall
         self._D = grid.dimensions
-        self._team, self._communicator = wall.team, wall.blocks.communicator
+        self._device, self._communicator = wall.device, wall.blocks.communicator
         cell = max(grid.spacing[: grid.dimensions])
         self._points = WallPoints(particles, exchange.rows, kernels, cell)
         self.thin = ThinBodies(particles, wall, cell)
-        self._domain = Domain(*(self._team.array(np.array(corner)) for corner in (grid.lower, grid.upper)))
+        self._domain = Domain(*(self._device.array(np.array(corner)) for corner in (grid.lower, grid.upper)))
 
     def find(self, start: Any) -> Passage:
         """Collective. Find the particles, which have moved from `start` (own, D) [m]."""
-        team, own = self._team, self._particles.count
-        own_middle, way = team.empty(start.shape), team.empty(own)
-        team.run(self._kernels.find_middle, own, start, self._particles.position, own_middle, way)
+        device, own = self._device, self._particles.count
+        own_middle, way = device.empty(start.shape), device.empty(own)
+        device.run(self._kernels.find_middle, own, start, self._particles.position, own_middle, way)
         stretched = self._points.stretched()
         largest = np.array([self._exchange.rows.largest(way, 0.0), float(stretched.shape[0])])
         farthest, split = self._communicator.maximum(largest)
@@ -65,10 +65,10 @@ class WallParticles:
     def cut(self, passage: Passage, start: Any, velocity: Any) -> WallMotion:
         """Collective. Cut the cells where the particles are, which have moved from `start` (own, D) [m] with a
         `velocity` (own, D) [m/s]."""
-        p, team, own, k, plan = self._particles, self._team, self._particles.count, self._kernels, passage.plan
+        p, device, own, k, plan = self._particles, self._device, self._particles.count, self._kernels, passage.plan
         # masses and velocities of all that are seen
-        own_mass = team.empty(own)
-        team.run(k.keep_mass, own, start, p.read("lone"), p.mass, p.density, self._domain, own_mass)
+        own_mass = device.empty(own)
+        device.run(k.keep_mass, own, start, p.read("lone"), p.mass, p.density, self._domain, own_mass)
         vector = tuple((a,) for a in range(self._D))
         moving, mass = plan.exchange([(velocity, vector), (own_mass, ((),))])
         # the points of the wall, with the images that count
@@ -78,10 +78,10 @@ class WallParticles:
             points_plan = self._ghosts(position, number)
         points = self._points_inside(points_plan, position, size)
         image, faded = self._weigh_images(points_plan, position, size, points_plan, points)
-        team.run(k.fade_images, points_plan.count, points_plan.key.device, faded, 2, points.values.reshape(-1))
+        device.run(k.fade_images, points_plan.count, points_plan.key.device, faded, 2, points.values.reshape(-1))
         if passage.split:
             image, faded = self._weigh_images(plan, p.position, self._points.volumes(), points_plan, points)
-        team.run(k.fade_images, plan.count, plan.key.device, faded, 1, mass)
+        device.run(k.fade_images, plan.count, plan.key.device, faded, 1, mass)
         # the cells
         sphere = self.thin.spheres(points_plan, points, passage.split)
         self._wall.cut(points, sphere, points_plan.key.device)
@@ -95,8 +95,8 @@ class WallParticles:
     def _points_inside(self, plan: GhostPlan, position: Any, size: Any) -> Cloud:
         """Collective. The points of a plan; values (count, 2): what of the volume `size` (own, 1) [m^D] of each is in
         the domain, and all of it."""
-        inside = self._team.empty((position.shape[0], 2))
-        self._team.run(self._kernels.keep_inside, position.shape[0], position, size, self._domain, inside)
+        inside = self._device.empty((position.shape[0], 2))
+        self._device.run(self._kernels.keep_inside, position.shape[0], position, size, self._domain, inside)
         position, volume = plan.exchange([(position, "position"), (inside, ((), ()))])
         return Cloud(position, volume, self._wall.sort(position, plan.key.device))
 
@@ -106,7 +106,7 @@ class WallParticles:
         """Collective. How much images along each axis count of the particles at a `position` (own, D) [m], of a `size`
         (own, 1) [m^D], beside the `points` of all bodies: (own, D) and (count, D) of the plan."""
         own, key = position.shape[0], points_plan.key.device
-        weight, ranges = self._team.empty((own, self._D)), self._wall.ranges
-        self._team.run(self._kernels.weigh_images, own, weight, position, size, self._domain, ranges, key, points)
+        weight, ranges = self._device.empty((own, self._D)), self._wall.ranges
+        self._device.run(self._kernels.weigh_images, own, weight, position, size, self._domain, ranges, key, points)
         (extended,) = plan.exchange([(weight, ((),) * self._D)])
         return weight, extended

@@ -85,9 +85,9 @@ class WallPoints:
         parent = np.repeat(np.arange(n), points)
         rank = np.arange(len(parent)) - np.repeat(np.cumsum(points) - points, points)
         # where they are
-        place, rest = position[parent], rank
+        point, rest = position[parent], rank
         for axis in range(D):
             along = rest % count[parent, axis] - 0.5 * (count[parent, axis] - 1)
-            place = place + along[:, None] * step[parent, :, axis]
+            point = point + along[:, None] * step[parent, :, axis]
             rest = rest // count[parent, axis]
-        return place, (volume / points[:, None])[parent], parent, rank
+        return point, (volume / points[:, None])[parent], parent, rank

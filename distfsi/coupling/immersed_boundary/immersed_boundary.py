@@ -20,12 +20,14 @@ from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.fluid.initial import InitialState
+from distfsi.fluid.model import FluidModel
 from distfsi.mesh import search
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.rows import Groups
+from distfsi.narrowing import present
 from distfsi.scene.description import Scene
 from distfsi.solid.solid import Solid
 
@@ -96,41 +98,46 @@ class ImmersedBoundary:
     causes = ("wall", "covered", "fresh", "sides")
     sub_steps, stray = 1, 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(
+        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Solid, blocks: Blocks, device: Device
+    ) -> None:
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
-        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
+        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         self._particles = SolidParticles(solid)
-        self._grid, self._table = blocks.grid_on(team), blocks.table_on(team)
+        self._grid, self._table = blocks.grid_on(device), blocks.table_on(device)
         constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
         constants |= {"LANES": 1, "TRANSFERRED": grid.dimensions}
-        self.kernels = team.build(PARTICLE_DRIVERS, constants)
-        self.fluid_kernels = team.build(FLUID_DRIVERS, model.constants, model.bindings, scene.fluid.precision)
-        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
+        self.kernels = device.build(PARTICLE_DRIVERS, constants)
+        self.fluid_kernels = device.build(
+            FLUID_DRIVERS, model.constants, model.bindings, present(scene.fluid).precision
+        )
+        self.exchange = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
 
         h = min(scene.domain.spacing)
-        self.cover_radius = COVER_RADIUS * max(h, 2.0 * max(body.spacing for body in scene.solid.bodies))
+        self.cover_radius = COVER_RADIUS * max(h, 2.0 * max(body.spacing for body in present(scene.solid).bodies))
         self.reach = min(VELOCITY_RADIUS * self.cover_radius, (grid.ghost_layers + 0.5) * h)
         D = grid.dimensions
-        self._cells = search.CellSort(self.kernels, team, np.array(grid.lower[:D]), np.array(grid.upper[:D]))
+        self._cells = search.CellSort(self.kernels, device, grid.lower[:D], grid.upper[:D])
         self._search_cell, self._cell_volume = min(grid.spacing[:D]), float(np.prod(grid.spacing))
-        self._real = np.dtype(scene.fluid.precision)
+        self._real = np.dtype(present(scene.fluid).precision).type
         self._around = self._find_surroundings(self._state_at_rest(scene))
         images = grid.ghost_layers * (np.array(grid.boundaries) == "symmetry")
-        self._seen_cells = team.array(np.column_stack([-images[:, 0], grid.cells + images[:, 1]]))
+        self._seen_cells = device.array(np.column_stack([-images[:, 0], grid.cells + images[:, 1]]))
         self._side_cells, self._sides, self._side_blocks = self._find_sides()
-        self._through_sides = DualArray(team, np.zeros((len(self._side_blocks), model.conserved)))
+        self._through_sides = DualArray(device, np.zeros((len(self._side_blocks), model.conserved)))
 
-        self.kind = DualArray(team, np.full((blocks.local_count, 1, *blocks.shape), kinds.UNKNOWN, np.uint8))
-        self._occupied = DualArray(team, np.ones(blocks.local_count, dtype=np.uint8))
-        self._transfer = team.array(blocks.allocate(grid.dimensions))
-        self._ledger = {cause: np.zeros((blocks.local_count, model.conserved)) for cause in self.causes[:-1]}
+        self.kind = DualArray(device, np.full((blocks.local_count, 1, *blocks.shape), kinds.UNKNOWN, np.uint8))
+        self._occupied = DualArray(device, np.ones(blocks.local_count, dtype=np.uint8))
+        self._transfer = device.array(blocks.allocate(grid.dimensions))
+        self._created = {cause: np.zeros((blocks.local_count, model.conserved)) for cause in self.causes[:-1]}
         solid.prepare(self.reach)
         self._counts = self.update_geometry().counts
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Primitive state (variables,) of the first region without its velocity."""
-        state = InitialState(scene.fluid, self.model).of(scene.fluid.regions[0].state)
+        fluid = present(scene.fluid)
+        state = InitialState(fluid, self.model).of(fluid.regions[0].state)
         rest = np.array(self.model.formula("primitives")(state), dtype=self._real)
         rest[self.model.phases : self.model.phases + self._dimensions] = 0.0
         return rest
@@ -173,26 +180,26 @@ class ImmersedBoundary:
 
     def update_geometry(self) -> CoveredCells:
         """Collective. Find the covered cells, and the velocity of the wall in those that fluxes see."""
-        around, team, blocks, D = self.solid.around, self.team, self.blocks, self._dimensions
+        around, device, blocks, D = self.solid.around, self.team, self.blocks, self._dimensions
         # the particles
         position, count = around.position, around.position.shape[0]
-        volume, momentum = team.empty((count, 1)), team.empty((count, 1 + D))
-        team.run(self.kernels.find_amounts, count, around.state, volume, momentum)
+        volume, momentum = device.empty((count, 1)), device.empty((count, 1 + D))
+        device.run(self.kernels.find_amounts, count, around.state, volume, momentum)
         _, bins = self._cells.sort(position, around.plan.key.device, self._search_cell)
         # what they cover
-        lost = team.zeros((blocks.local_count, self.model.conserved))
+        lost = device.zeros((blocks.local_count, self.model.conserved))
         known = (self._kinds, self._occupied.device, self.fluid.device_state, lost, self.cover_radius)
-        team.run(self.fluid_kernels.cover, blocks.local_count, *known, Cloud(position, volume, bins), self._grid)
-        self._ledger["covered"] -= team.download(lost) * self._cell_volume
+        device.run(self.fluid_kernels.cover, blocks.local_count, *known, Cloud(position, volume, bins), self._grid)
+        self._created["covered"] -= device.download(lost) * self._cell_volume
         self._exchange(self.kind.device, np.array([-1]), kinds.COVERED)
         counts, covered, deep, fresh = self._list_cells()
         self._counts = counts
         # how the wall moves there
         n = covered.shape[0]
-        velocity, inertia = team.empty((n, D), self._real), team.empty(n)
+        velocity, inertia = device.empty((n, D), self._real), device.empty(n)
         particles = Cloud(position, momentum, bins)
         self._run(self.kernels.find_wall_velocity, covered, velocity, inertia, self.reach, particles, self._grid)
-        passed = team.zeros((n, self.model.conserved))
+        passed = device.zeros((n, self.model.conserved))
         return CoveredCells(covered, deep, fresh, counts, velocity, inertia, passed)
 
     def merge(self, cells: CoveredCells, stage: Stage) -> Any:
@@ -207,7 +214,7 @@ class ImmersedBoundary:
             self._run(k.fill_fresh, cells.fresh, U, kind, around, grid)
             content = self.team.empty((cells.fresh.shape[0], self.model.conserved))
             self._run(k.find_contents, cells.fresh, U, content, grid)
-            self._ledger["fresh"] += self._per_block(cells.counts[:, FRESH_CELLS], content) * self._cell_volume
+            self._created["fresh"] += self._per_block(cells.counts[:, FRESH_CELLS], content) * self._cell_volume
         return U
 
     def apply_wall_fluxes(self, cells: CoveredCells, U: Any, stage: Stage, dt: float) -> None:
@@ -223,42 +230,42 @@ class ImmersedBoundary:
 
     def transfer_impulse(self, cells: CoveredCells, U: Any, dt: float) -> Transfer:
         """Collective. What the fluid gives to this rank's particles in the step."""
-        D, p, team, k = self._dimensions, self._particles, self.team, self.kernels
+        D, p, device, k = self._dimensions, self._particles, self.team, self.kernels
         # what a covered cell gives per kernel value
         wall = (cells.passed, cells.velocity, cells.inertia)
         self._run(self.fluid_kernels.find_transfer, cells.covered, *wall, self._transfer, self._grid)
         self._exchange(self._transfer, np.arange(D), 0.0)
         # the sum over cells around each particle
-        own, start, home = p.count, p.start, team.empty(p.count, np.int64)
-        team.run(k.find_homes, own, start, home, self._grid, self._table)
-        chosen, gained = team.array(np.arange(own)), team.empty((own, D))
-        receivers = Receivers(start, home, team.array(np.ones((own, D))))
+        own, start, home = p.count, p.start, device.empty(p.count, np.int64)
+        device.run(k.find_homes, own, start, home, self._grid, self._table)
+        chosen, gained = device.array(np.arange(own)), device.empty((own, D))
+        receivers = Receivers(start, home, device.array(np.ones((own, D))))
         given = (self.reach, self._kinds, kinds.COVERED, self._transfer, self._seen_cells)
-        team.run(k.spread, own, chosen, receivers, *given, gained, self._grid)
-        impulse = team.empty((own, D))
-        team.run(k.push, own, p.mass, gained, impulse)
+        device.run(k.spread, own, chosen, receivers, *given, gained, self._grid)
+        impulse = device.empty((own, D))
+        device.run(k.push, own, p.mass, gained, impulse)
         self._run(k.clear, cells.covered, D, self._transfer.reshape(-1), self._grid)
-        self._ledger["wall"] -= self._per_block(cells.counts[:, COVERED_CELLS], cells.passed)
+        self._created["wall"] -= self._per_block(cells.counts[:, COVERED_CELLS], cells.passed)
         return Transfer(impulse)
 
     def account_work(self, cells: CoveredCells, transfer: Transfer, excess: Any) -> None:
         """Enter what the solid has received, after solid.apply_impulse()."""
         D, P = self._dimensions, self.model.phases
-        self._ledger["wall"][:, P : P + D] += self._particles.impulse
-        self._ledger["wall"][:, -1] += self._particles.work
+        self._created["wall"][:, P : P + D] += self._particles.impulse
+        self._created["wall"][:, -1] += self._particles.work
 
     # ---- parts of it ------------------------------------------------------------------------------------------------
 
     def _list_cells(self) -> tuple[np.ndarray, Any, Any, Any]:
         """How many cells of each kind there are (local blocks, 3); covered cells that fluxes see, those that they do
         not, and fresh ones, block by block."""
-        team, count, k = self.team, self.blocks.local_count, self.kernels
-        found = team.empty((count, 3), np.int64)
-        team.run(k.find_depth, count, self._kinds, self._occupied.read, self._around.offsets, found, self._grid)
-        counts = team.download(found)
-        first = team.array(np.cumsum(counts, axis=0) - counts)
-        lists = [team.empty(n, np.int64) for n in counts.sum(axis=0)]
-        team.run(k.list_cells, count, self._kinds, self._occupied.read, first, *lists, self._grid)
+        device, count, k = self.team, self.blocks.local_count, self.kernels
+        found = device.empty((count, 3), np.int64)
+        device.run(k.find_depth, count, self._kinds, self._occupied.read, self._around.offsets, found, self._grid)
+        counts = device.download(found)
+        first = device.array(np.cumsum(counts, axis=0) - counts)
+        lists = [device.empty(n, np.int64) for n in counts.sum(axis=0)]
+        device.run(k.list_cells, count, self._kinds, self._occupied.read, first, *lists, self._grid)
         return counts, *lists
 
     @property
@@ -301,17 +308,17 @@ class ImmersedBoundary:
         return np.where(self.covered, 0.0, 1.0)
 
     def snapshot(self) -> Snapshot:
-        """What a restart needs: which cells are covered, so that those are known that come free; and the books."""
+        """What a restart needs: which cells are covered, so that those are known that come free; and the budget."""
         return {
             "cells": {"kind": self.blocks.without_ghosts(self.kind.host())},
-            "sums": {**self._ledger, "sides": self._through_sides.host()},
+            "sums": {**self._created, "sides": self._through_sides.host()},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.kind.host())[:] = snapshot["cells"]["kind"]
         self._occupied.host()[:] = 1
-        for cause, amounts in {**self._ledger, "sides": self._through_sides.host()}.items():
+        for cause, amounts in {**self._created, "sides": self._through_sides.host()}.items():
             amounts[:] = snapshot["sums"][cause]
         for pair in (self.kind, self._occupied, self._through_sides):
             pair.changed()
@@ -320,5 +327,5 @@ class ImmersedBoundary:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
         count, through = self.blocks.local_count, self._through_sides.host()
         sides = np.stack([np.bincount(self._side_blocks, amounts, count) for amounts in through.T], axis=1)
-        totals = self.blocks.sum(np.hstack([*self._ledger.values(), sides]))
+        totals = self.blocks.sum(np.hstack([*self._created.values(), sides]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

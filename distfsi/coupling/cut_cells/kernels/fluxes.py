@@ -302,7 +302,7 @@ def stop_at_wall(walls: Walls, at, axis, T, grid: BlockGrid):
 
 
 @driver
-def book_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls, dt, weight, grid: BlockGrid):
+def account_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls, dt, weight, grid: BlockGrid):
     """passed[n] grows by what the fluid's stage counts as leaving through a domain's side, side[n] = 2 axis + (0 low,
     1 high), beyond what leaves there, for the cells `chosen`. dt [s]: of the step; weight [s]: that times the stage's
     share.
