@@ -9,15 +9,22 @@ import math
 import numpy as np
 
 from distfsi.device.cpu import Team
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
 from distfsi.solid.solid import Solid
 
-COPPER_EOS = d.MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
-COPPER = d.JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
-SOFT_EOS = d.LinearEos(bulk_modulus=3.25e9)
-SOFT = d.PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
+COPPER_EOS = MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
+COPPER = JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
+SOFT_EOS = LinearEos(bulk_modulus=3.25e9)
+SOFT = PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
 
 
 def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None, failure=None):
@@ -31,7 +38,7 @@ def solid(
     symmetric=(),
     team=None,
     block_cells=4,
-    gravity=None,
+    sources=(),
     viscosity=(1.0, 2.0),
     form="updated_lagrangian",
     communicator=None,
@@ -45,7 +52,7 @@ def solid(
         title="test",
         domain=d.Domain(lower, upper, (16,) * D, kinds),
         time=d.Time(1.0, 0.5, None),
-        gravity=gravity or (0.0,) * D,
+        sources=sources,
         fluid=None,
         solid=d.Solid(tuple(bodies), smoothing, *viscosity, form=form, artificial_stress=artificial_stress),
         output=d.Output("", 0.0, 1),
@@ -89,7 +96,7 @@ def colliding_discs(team, communicator=None):
     clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
     right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
     box = (-1.0, 0.0), (1.0, 1.0), (1,)
-    return solid([left, right], *box, team, 2, gravity=(0.0, -1e3), communicator=communicator), 60
+    return solid([left, right], *box, team, 2, sources=(Gravity((0.0, -1e3)),), communicator=communicator), 60
 
 
 def colliding_balls(team):
@@ -109,7 +116,7 @@ def bonded_discs(team):
 
 def bursting_ball(team, communicator=None):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
-    failure = d.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, d.Scatter(10.0, 0.1, 1))
+    failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, Scatter(10.0, 0.1, 1))
     ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
     box = (-1.0, -1.0, 0.0), (1.0,) * 3, (2,)
     part = solid([ball], *box, team, 2, form="total_lagrangian", communicator=communicator)

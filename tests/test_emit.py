@@ -49,7 +49,7 @@ def types_of(function, real="float64"):
 
 def text_of(function, constants=None, bindings=None, real="float64"):
     constants, bindings = constants or {}, bindings or {}
-    types = types_of(function, real) + (REALS[real],) * len(Native(function, constants, bindings, real).numbers)
+    types = types_of(function, real) + (REALS[real],) * len(Native(function, constants, bindings, real).numbers())
     return module_of(function, constants, bindings, real, types)[0].text()
 
 
@@ -141,6 +141,11 @@ def calls_a_constant(x):
     return x * slope + level
 
 
+def drops_a_constant(x):
+    level, slope = constant_pair(x)
+    return x + slope
+
+
 def scaled(x):
     return GAMMA * x
 
@@ -219,6 +224,10 @@ def test_a_callee_that_returns_a_constant_is_inlined():
     assert body_of(calls_a_constant, **constants) == ["return numbers_[0]"]
     assert both(calls_a_constant, 1.0, constants=constants) == -2.0
     assert "constant_pair" not in text_of(calls_a_constant, constants)
+
+
+def test_numbers_that_vanish_are_not_given():
+    assert both(drops_a_constant, 1.0, constants={"GAMMA": 4.0}) == 1.0
 
 
 def test_bound_formulas_keep_their_own_constants():
@@ -607,6 +616,10 @@ def arithmetic_of_numbers(x):
     return x * (1.0 / GAMMA) + (GAMMA - 1.0) * -GAMMA / 2.0
 
 
+def ratio_of_numbers(x):
+    return x * (GAMMA / GAMMA) + (HALF / GAMMA - 1.0) * x
+
+
 def choice_by_a_number(x):
     y = x if GAMMA > 1.0 else -x
     if GAMMA:
@@ -649,6 +662,10 @@ def test_arithmetic_among_numbers_is_done_once_in_double():
         "(1.0 / given['GAMMA'])": 1.0 / 3.0,
         "(((given['GAMMA'] - 1.0) * -given['GAMMA']) / 2.0)": -3.0,
     }
+
+
+def test_a_number_over_itself_is_one():
+    assert body_of(ratio_of_numbers, GAMMA=3.0) == ["return x + numbers_[0] * x"]
 
 
 def test_numbers_decide_at_run_time_but_for_zero():

@@ -56,7 +56,7 @@ def native_row(row, scene):
 
 def machine_code(native, arguments):
     """What numba makes of a driver for such arguments."""
-    numbers = native.numbers
+    numbers = native.numbers()
     native.dispatcher.compile(tuple(map(typeof, [*arguments, *numbers])))
     return "\n".join(native.dispatcher.inspect_asm().values())
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 
 class Bonds(NamedTuple):
@@ -28,7 +28,7 @@ class SolidParticles:
     All that a coupling asks of a solid but for its steps. The impulse on it goes by apply_impulse().
     """
 
-    def __init__(self, solid: Solid):
+    def __init__(self, solid: Structure):
         self._solid = solid
 
     @property

@@ -41,7 +41,8 @@ class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step. stages: those that make a step.
+    step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
+    cells; of the others.
     """
 
     def __init__(self, scene: Scene, model, blocks: Blocks, team: Device):
@@ -92,7 +93,7 @@ class Fluid:
                         places.append(origin + first)
         self.tiles = np.array(rows, dtype=np.int64).reshape(-1, 8)
         waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
-        self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
+        self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
         self._table = self.team.array(self.tiles)
         self._through = DualArray(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
@@ -141,6 +142,11 @@ class Fluid:
         gives them changes between stages. By default all cells are whole."""
         self._volumes = volumes
 
+    def average_sources(self, start: float, dt: float) -> None:
+        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
+        if self.model.body_force.average_over(start, dt):
+            self.rest.wake()
+
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
         self._before = self._booked()
@@ -165,19 +171,22 @@ class Fluid:
         """Copies of what has left through the domain's sides, and of the number of limited faces."""
         return self._through.host().copy(), self._limited.host().copy()
 
+    def start_exchange(self, stage: Stage) -> None:
+        """Start to fill the ghost cells of the stage's input; `exchange.finish` ends it."""
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.start_exchange(stage)
         self.exchange.finish()
 
-    def advance_stage(self, stage: Stage, dt: float) -> None:
-        """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
+    def begin_stage(self) -> None:
+        """Find out which tiles are at rest."""
         self.rest.begin_stage()
         self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
-        self.advance_tiles(self._ready_tiles, stage, dt)
-        self.exchange.finish()
-        self.advance_tiles(self._waiting_tiles, stage, dt)
+
+    def end_stage(self, stage: Stage) -> None:
+        """After all tiles were advanced; after the last stage the state is that of the new time."""
         self.rest.stages = self.team.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:

@@ -1,13 +1,11 @@
 """From the words of a scene to formulas: the only place where a name in the input meets a function.
 
-A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one description in scene/.
+A new equation of state is one file in laws/fluid/.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, singledispatch
 
 import numpy as np
 
@@ -15,8 +13,9 @@ from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
-from distfsi.laws.fluid import jwl, stiffened_gas
-from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
+from distfsi.laws.body_force import BodyForce
+from distfsi.laws.law import FluidEos
+from distfsi.scene.description import Fluid, Scene
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
     "first_order": (reconstruction.muscl, limiters.first_order, 2),
@@ -34,45 +33,6 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 
 @dataclass(frozen=True)
-class FluidEos:
-    """p = reference(rho) + omega rho e, as a formula with its constants."""
-
-    reference: Bound
-    omega: float
-    closed_form: bool
-
-    def evaluate(self, rho: float) -> tuple[float, float]:
-        """Reference pressure [Pa] and its slope with density, outside the kernels."""
-        return self._plain_reference(rho)
-
-    @cached_property
-    def _plain_reference(self) -> Callable[[float], tuple[float, float]]:
-        return plain(self.reference.function, self.reference.constants)
-
-
-@singledispatch
-def fluid_eos(eos: object) -> FluidEos:
-    """The formula of an equation of state of the input."""
-    raise TypeError(f"no formula for {eos}")
-
-
-@fluid_eos.register
-def _(eos: IdealGas) -> FluidEos:
-    return fluid_eos(StiffenedGas(eos.gamma, 0.0))
-
-
-@fluid_eos.register
-def _(eos: StiffenedGas) -> FluidEos:
-    return FluidEos(Bound(stiffened_gas.reference, {"GAMMA": eos.gamma, "P_INF": eos.p_inf}), eos.gamma - 1.0, True)
-
-
-@fluid_eos.register
-def _(eos: Jwl) -> FluidEos:
-    constants = {"RHO0": eos.rho0, "A": eos.A, "B": eos.B, "R1": eos.R1, "R2": eos.R2, "OMEGA": eos.omega}
-    return FluidEos(Bound(jwl.reference, constants), eos.omega, False)
-
-
-@dataclass(frozen=True)
 class FluidModel:
     """Everything the fluid's kernels are specialised with, and the meaning of its variables.
 
@@ -83,6 +43,7 @@ class FluidModel:
     bindings: dict[str, Bound]
     eos: tuple[FluidEos, ...]
     dimensions: int
+    body_force: BodyForce
 
     @property
     def phases(self) -> int:
@@ -105,24 +66,26 @@ class FluidModel:
 
     def formula(self, name: str):
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        return plain(self.bindings[name].function, self.constants, self.bindings)
+        bound = self.bindings[name]
+        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
 
 
 def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
     fluid: Fluid = scene.fluid
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
-    eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
+    eos = tuple(phase.eos for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     curved = reconstructed is reconstruction.weno5
+    body_force = BodyForce(scene.sources, dimensions)
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
         "FLUXES": variables + more_fluxes,
-        "GRAVITY": scene.gravity,
+        "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
@@ -131,7 +94,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "CURVED": curved,
         "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
-    } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
+    }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
     if constants["FINISHES"]:
@@ -145,10 +108,10 @@ def fluid_model(scene: Scene) -> FluidModel:
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
     bindings |= {name: Bound(function) for name, function in solver}
-    for k, (e, stored) in enumerate(zip(eos, _stored_references(fluid, eos), strict=True), 1):
-        bindings[f"reference_{k}"] = replace(e.reference, owner=f"phase {k}")
-        bindings[f"stored_reference_{k}"] = replace(stored, owner=f"phase {k}")
-    return FluidModel(constants, bindings, eos, dimensions)
+    for k, phase in enumerate(fluid.phases, 1):
+        bindings |= {f"{name}_{k}": Bound.of(phase.eos, name, f"phase {k}") for name in ("reference", "grueneisen")}
+        bindings[f"stored_reference_{k}"] = _stored_reference(fluid, k)
+    return FluidModel(constants, bindings, eos, dimensions, body_force)
 
 
 def ghost_layers(scene: Scene) -> int:
@@ -156,14 +119,12 @@ def ghost_layers(scene: Scene) -> int:
     return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
 
 
-def _stored_references(fluid: Fluid, eos: tuple[FluidEos, ...]) -> list[Bound]:
-    """In float32 the energies of stiffened gases are counted from those of their first state without pressure."""
-    found = []
-    for k, (phase, formula) in enumerate(zip(fluid.phases, eos, strict=True)):
-        first = next((region.state for region in fluid.regions if region.state.phase == k), None)
-        shifted = fluid.precision == "float32" and isinstance(phase.eos, StiffenedGas) and first is not None
-        rest = {"REST_DENSITY": first.density} if shifted else {}
-        found.append(
-            Bound(stiffened_gas.shifted_reference, formula.reference.constants | rest) if shifted else formula.reference
-        )
-    return found
+def _stored_reference(fluid: Fluid, k: int) -> Bound:
+    """The reference to the energies of phase k that cells hold: in float32 those of the laws that can are counted from
+    the phase's first state without pressure."""
+    eos, owner = fluid.phases[k - 1].eos, f"phase {k}"
+    first = next((region.state for region in fluid.regions if region.state.phase == k - 1), None)
+    if fluid.precision == "float32" and hasattr(eos, "shifted_reference") and first is not None:
+        bound = Bound.of(eos, "shifted_reference", owner)
+        return replace(bound, constants={**bound.constants, "REST_DENSITY": first.density})
+    return Bound.of(eos, "reference", owner)

@@ -36,11 +36,10 @@ VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the vol
 FLUXES = Symbol(
     "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
 )
-GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
+BODY_FORCE = Symbol("body force per mass, one component per dimension [m/s2], the mean over the step")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
-OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega rho e")
-OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
-CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
+REST_DENSITY = Symbol("density at which energies that are counted from rest vanish with the pressure [kg/m3]")
+CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas, to the root of a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
 FINISHES = Symbol("whether relaxation may need more than its fixed number of steps")
@@ -51,6 +50,8 @@ LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside 
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+grueneisen_1 = chosen("grueneisen_1", "phase 1: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
+grueneisen_2 = chosen("grueneisen_2", "phase 2: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
 stored_reference_1 = chosen(
     "stored_reference_1", "as reference_1, to the energy that is stored: p = reference + omega rho e"
 )
@@ -72,7 +73,7 @@ is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the f
 limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
 before_relaxation = chosen("before_relaxation", "as updated -> where both phases stand, transport's change of a1")
-range_of_change = chosen("range_of_change", "volume fraction -> least and largest change by relaxation")
+range_of_change = chosen("range_of_change", "where both phases stand -> least and largest change of a1 by relaxation")
 halved_range = chosen("halved_range", "where both phases stand, range of changes -> the half with one pressure")
 fraction_after = chosen("fraction_after", "state before the step, change in the stage -> volume fraction")
 bulk_modulus = chosen("bulk_modulus", "primitive state -> rho c^2 [Pa], positive where the state is admissible")

@@ -9,13 +9,12 @@ from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 
+from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
     Ball,
     Body,
     Box,
-    Compaction,
-    Concrete,
     Cylinder,
     Domain,
     Fluid,
@@ -42,7 +41,7 @@ from distfsi.scene.schema import (
     Sections,
 )
 from distfsi.scene.shapes import bounding_box, contains
-from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
+from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
@@ -122,7 +121,11 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
         elif not least <= state.volume_fraction <= 1.0 - least:
             yield Fault((*path, "volume_fraction"), f"expected {least:g} to 1 - {least:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
-    cold_pressure, cold_energy, _ = cold_curve(phase.eos, state.density)
+    if state.density >= phase.eos.maximum_density:
+        text = f"too high: '{phase.name}' has states below {phase.eos.maximum_density:.6g} kg/m3 only"
+        yield Fault((*path, "density"), text)
+        return
+    cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
@@ -186,8 +189,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
-    if isinstance(body.eos, Compaction) != isinstance(body.strength, Concrete):
-        yield Fault((*path, "strength"), "'concrete' and the eos 'compaction' need each other")
+    if (pair := _lone_partner(body)) is not None:
+        yield Fault((*path, "strength"), "'{}' and the eos '{}' need each other".format(*pair))
+
+
+def _lone_partner(body: Body) -> tuple[str, str] | None:
+    """Words of a strength and an EOS that need each other, if the body has but one of them."""
+    strength, eos = word_of(type(body.strength)), word_of(type(body.eos))
+    pairs = ((body.eos.partner or strength, eos), (strength, body.strength.partner or eos))
+    return next((pair for pair in pairs if pair != (strength, eos)), None)
 
 
 def _cut_off_axis(shape: Shape, domain: Domain) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.device.interface import Columns, Device, DualArray
 from distfsi.errors import Diverged
+from distfsi.laws.body_force import BodyForce
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels import particles as particle_kernels
@@ -31,6 +32,7 @@ from distfsi.solid.kernels import material, motion
 from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
 
@@ -63,6 +65,7 @@ class Solid:
     before   (own, D) [m/s] velocities then, on the device
     carried  (own, D) [m/s] mean velocity since then, on the device
     sub_steps  that have been made since then
+    body_force  that of the sources, over the sub-step
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
@@ -75,10 +78,11 @@ class Solid:
         axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
         self._components = self.dimensions * (self.dimensions + 1) // 2
+        self.body_force = BodyForce(scene.sources, self.dimensions)
         constants = {
             "DIMENSIONS": self.dimensions,
             "COMPONENTS": self._components,
-            "GRAVITY": tuple(map(float, scene.gravity)),
+            "BODY_FORCE": self.body_force.acceleration,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
             "SMOOTHING_RATIO": scene.solid.smoothing,
@@ -89,7 +93,7 @@ class Solid:
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, team, self.kernels)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
-        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(
+        self.form: SolidForm = UpdatedLagrangian(
             self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
         )
         if scene.solid.form == "total_lagrangian":
@@ -234,7 +238,7 @@ class Solid:
         self._groups = Groups(self.team, self.kernels, sizes, self._order)
 
     def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
-        """A column (own, …) of another part's: it goes with the particles to other ranks and into restart files, and
+        """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
         into field files if it is `shown`."""
         self.columns[name] = values
         if shown:

@@ -17,24 +17,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
+from distfsi.laws.law import Failure
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
-from distfsi.scene.description import (
-    Body,
-    Domain,
-    Failure,
-    JohnsonCookFailure,
-    LinearEos,
-    Output,
-    PerfectlyPlastic,
-    Performance,
-    Scatter,
-    Scene,
-    Solid,
-    Time,
-    Tube,
-)
+from distfsi.scene.description import Body, Domain, Output, Performance, Scene, Solid, Time, Tube
 from distfsi.simulation import Simulation
 
 DIRECTORY = Path("out/study_fragments")
@@ -87,7 +78,7 @@ def ring(rate: float, thickness: float, rows: int, failure: Failure | None) -> S
     size = 4.0 * RADIUS
     scene = Scene(
         "ring", Domain((0.0, 0.0), (size, size), (8, 8), (("symmetry", "outflow"),) * 2), Time(1.0, 0.5, None),
-        (0.0, 0.0), None, Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
+        None, Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
     )  # fmt: skip
     return Simulation.of(scene, Communicator(), 1)
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import of_kind, present
 from distfsi.scene import load
-from distfsi.scene.description import Box, Cylinder, LinearEos, Tube
+from distfsi.scene.description import Box, Cylinder, Tube
 from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 

@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.errors import Diverged
+from distfsi.laws.law import FluidEos
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.scene.description import (
@@ -23,10 +26,7 @@ from distfsi.scene.description import (
     CouplingScheme,
     Domain,
     Fluid,
-    FluidEos,
     FluidState,
-    LinearEos,
-    NoStrength,
     Output,
     Performance,
     Phase,
@@ -71,7 +71,7 @@ def scene_of(
     ]
     fluid = Fluid((Phase("fluid", eos),), tuple(states), "minmod", 1e-6, ((None, None),) * D, "float64")
     return Scene(
-        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), (0.0,) * D, fluid,
+        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), fluid,
         Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((CELLS,) * D, (CELLS,) * D),
         coupling=Coupling(scheme),
     )  # fmt: skip

@@ -19,11 +19,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.law import FluidEos
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.verdicts import VerdictMap, draw_verdicts
 from distfsi.scene import load
-from distfsi.scene.description import FluidEos, FluidState, HalfSpace, IdealGas, Phase, Region, Scene
+from distfsi.scene.description import FluidState, HalfSpace, Phase, Region, Scene
 from distfsi.simulation import Simulation
 from distfsi.study.choices import Method, name_of, settings, varied_alone
 from distfsi.study.exact import RIGHTWARD, Material, PureState, exact_riemann, wave_into
@@ -174,7 +176,7 @@ def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
         return Verdict(FAILED, _cause(error))
     if _swings(simulation, tube):
         return Verdict(SWUNG)
-    faces, redone = present(simulation.fluid).limited_faces(), simulation.rejected_steps
+    faces, redone = present(simulation.fluid).limited_faces(), present(simulation.fluid).rejected_steps
     return Verdict(HELPED, f"{faces} limited faces; {redone} redone steps") if faces or redone else Verdict(SURVIVED)
 
 

@@ -16,20 +16,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from distfsi.errors import Diverged
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
-from distfsi.scene.description import (
-    Body,
-    Box,
-    Domain,
-    JohnsonCook,
-    MieGrueneisen,
-    Output,
-    Performance,
-    Scene,
-    Solid,
-    Time,
-)
+from distfsi.scene.description import Body, Box, Domain, Output, Performance, Scene, Solid, Time
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
 from distfsi.study.stability import Map, Stability, corners
@@ -60,7 +51,7 @@ def scene_of(form: Form, bodies: Sequence[Body], size: float) -> Scene:
     """Bodies in a box that reaches `size` [m] to all sides."""
     lower, upper = (-size, -size), (size, size)
     return Scene(
-        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None), (0.0, 0.0),
+        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None),
         None, Solid(tuple(bodies), 1.3, 0.5, 1.0, **form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
     )  # fmt: skip
 

@@ -15,10 +15,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.scene import load
-from distfsi.scene.description import JohnsonCookFailure, Scatter
 from distfsi.scene.description import Solid as SolidOfScene
 from distfsi.simulation import Simulation
 from distfsi.solid.solid import Solid

@@ -32,7 +32,7 @@ from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, u
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
@@ -70,7 +70,7 @@ class CutCells:
     reach = 0.0
 
     def __init__(
-        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Solid, blocks: Blocks, device: Device
+        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Structure, blocks: Blocks, device: Device
     ) -> None:
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device

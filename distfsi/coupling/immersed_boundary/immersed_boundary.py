@@ -29,7 +29,7 @@ from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 COVER_RADIUS = 1.5  # in cells, of the kernel that decides what is covered; at least three particle spacings
 VELOCITY_RADIUS = 1.4  # in cover radii, of the kernel between particles and cells; at most the ghost cells allow
@@ -99,7 +99,7 @@ class ImmersedBoundary:
     sub_steps, stray = 1, 0.0
 
     def __init__(
-        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Solid, blocks: Blocks, device: Device
+        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Structure, blocks: Blocks, device: Device
     ) -> None:
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
         self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device

@@ -174,7 +174,7 @@ template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> befor
         for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
         if (values[VARIABLES] >= 0) return;
         const auto start = before_relaxation(numbers, before, now, W, D, b, dt);
-        auto range = range_of_change(numbers, item<1>(item<0>(start)));
+        auto range = range_of_change(numbers, item<0>(start));
 #pragma unroll 1
         for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
         U_new[(VARIABLES - 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));

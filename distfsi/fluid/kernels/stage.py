@@ -245,7 +245,7 @@ def finish_cells(
             b,
             dt,
         )
-        low, high = range_of_change(phases[1])
+        low, high = range_of_change(phases)
         for _ in range(HALVINGS):
             low, high = halved_range(phases, low, high)
         store(U_new, u + (VARIABLES - 1) * su + i, fraction_after(before, moved + 0.5 * (low + high)))

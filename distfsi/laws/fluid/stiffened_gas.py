@@ -1,21 +1,36 @@
-"""Stiffened gas p = (gamma - 1) rho e - gamma p_inf (paper, Eq. 14 corrected); p_inf = 0 is the ideal gas (Eq. 12)."""
+"""The stiffened gas (paper, Eq. 14 corrected)."""
 
-from distfsi.formulas.symbols import Symbol
+from dataclasses import dataclass
 
-GAMMA = Symbol("ratio of specific heats")
-P_INF = Symbol("stiffness pressure [Pa]")
-REST_DENSITY = Symbol("density at which the shifted energy vanishes with the pressure [kg/m3]")
-
-
-def reference(rho):
-    """Reference pressure [Pa] and its slope with density."""
-    return (-GAMMA * P_INF, 0.0)
+from distfsi.formulas.symbols import REST_DENSITY
+from distfsi.laws.law import FluidEos, number, quantity
 
 
-def shifted_reference(rho):
-    """The reference to energies counted from that at REST_DENSITY without pressure, a constant per mass.
+@dataclass(frozen=True)
+class StiffenedGas(FluidEos):
+    """p = (gamma - 1) rho e - gamma p_inf."""
 
-    For water at 1 bar the energy itself is 7764 times the pressure over gamma - 1: too much for seven digits.
-    """
-    rise = GAMMA * P_INF / REST_DENSITY
-    return (rise * (rho - REST_DENSITY), rise)
+    closed_form = True
+
+    gamma: float = number("exponent", above=1.0)
+    p_inf: float = quantity("Pa", "stiffening pressure", at_least=0.0)
+
+    def reference(self, rho):
+        """Reference pressure [Pa] and its slope with density [m2/s2]."""
+        return (-self.gamma * self.p_inf, 0.0)
+
+    def grueneisen(self, rho):
+        """Grueneisen coefficient and its slope with density."""
+        return (self.gamma - 1.0, 0.0)
+
+    def cold_curve(self, rho):
+        """Pressure [Pa] and energy [J/kg] of the coldest state."""
+        return (-self.p_inf, self.p_inf / rho)
+
+    def shifted_reference(self, rho):
+        """The reference to energies counted from that at REST_DENSITY without pressure, a constant per mass.
+
+        For water at 1 bar the energy itself is 7764 times the pressure over gamma - 1: too much for seven digits.
+        """
+        rise = self.gamma * self.p_inf / REST_DENSITY
+        return (rise * (rho - REST_DENSITY), rise)

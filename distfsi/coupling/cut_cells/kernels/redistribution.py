@@ -132,7 +132,7 @@ def relaxed_by_bisection(Q, i):
     """Volume fraction at which both phases of the content in lane i have one pressure."""
     content = tuple(load(Q, v * LANES + i) for v in static_range(VARIABLES + 2))
     U, phases = state_before_relaxation(content, load(Q, (VARIABLES + 2) * LANES + i))
-    low, high = range_of_change(phases[1])
+    low, high = range_of_change(phases)
     for _ in range(HALVINGS):
         low, high = halved_range(phases, low, high)
     return phases[1] + 0.5 * (low + high)
