@@ -238,7 +238,7 @@ class Solid:
         self._groups = Groups(self.team, self.kernels, sizes, self._order)
 
     def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
-        """A column (own, …) of another part's: it goes with the particles to other ranks and into restart files, and
+        """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
         into field files if it is `shown`."""
         self.columns[name] = values
         if shown:
