@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.interface import Device
+from distfsi.device.native import compilation
 from distfsi.device.nvrtc import CompileError
 from distfsi.diagnostics.budget import Budget
 from distfsi.direct import arrives, refusal
@@ -18,7 +19,6 @@ from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.journal import Journal, set_aside
-from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
 from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
@@ -28,6 +28,7 @@ from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
 
 STEPS_BETWEEN_DEALS = 100
+STEPS_TO_COMPILE = 2  # the second one goes on from the state that the first one leaves
 
 
 def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
@@ -54,6 +55,17 @@ def _refuse(faults: list[str], communicator: Communicator) -> None:
     faults = [fault for others in communicator.allgather(faults) for fault in others]
     if faults:
         raise InputError(sorted(set(faults)))
+
+
+def compile_kernels(scene: Scene, communicator: Communicator) -> int:
+    """Compile what the first steps of a scene need; how many kernels were not yet on disk. Nothing is written."""
+    simulation = Simulation.of(scene, communicator)
+    budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
+    simulation.watch()
+    for _ in range(STEPS_TO_COMPILE):
+        simulation.step()
+    budget.summary(simulation)
+    return compilation.made
 
 
 def run(
@@ -84,7 +96,7 @@ def run(
     threads = threads or threads_of_rank(communicator)
     journal = Journal(directory, scene, communicator, threads)
     costs, device = None, gpu_of_rank(communicator, direct) if on_gpu else None
-    with requests, closing(progress), threadpool_limits(1), journal:
+    with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
             simulation.asked = requests.strongest
@@ -108,6 +120,8 @@ def run(
     fluid = simulation.fluid
     rest = f" {100 * fluid.share_at_rest():.0f} % of the tile stages were at rest." if fluid else ""
     progress.finish(f"{done} {budget.summary(simulation)}{rest}")
+    from distfsi.output.picture import draw_summary
+
     picture = on_root(communicator, directory / "summary.png", lambda: draw_summary(directory))
     if communicator.rank == 0:
         print(f"results in {directory}, picture in {picture}", flush=True)

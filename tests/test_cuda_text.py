@@ -1,4 +1,4 @@
-"""The CUDA C of every kernel, run on the host, gives the bits of numba: in whole scenes, call by call."""
+"""The CUDA C of every kernel, run on the host, gives the bits of the CPU: in whole scenes, call by call."""
 
 import pytest
 

@@ -10,12 +10,12 @@ import pytest
 import fake_cupy
 import mpi_gpu
 from distfsi import direct
-from distfsi.commands import works
 from distfsi.device import cuda, host
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostArray, HostRuntime
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.resources import works
 from distfsi.run import gpu_of_rank, run
 from distfsi.scene import load
 from distfsi.simulation import Simulation

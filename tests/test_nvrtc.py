@@ -4,9 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.mesh.communicator import Communicator
+from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.study import kernels
 from launch import ROOT

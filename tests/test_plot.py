@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage, imread
 from PIL import Image
 
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import fields, frames

@@ -1,8 +1,8 @@
-"""The second writer: a driver and all the formulas it reaches -> CUDA C, from the same folded trees as `numba_text`.
+"""The second writer: a driver and all the formulas it reaches -> CUDA C, from the folded trees of device/llvm_text.py.
 
 A driver that is a loop `for i in range(begin, end):` over independent items becomes a kernel with one thread per item.
 The text is C++20 for NVRTC and, with device/host.h in front, for a compiler of the host; device/runtime.h gives it its
-types. What a driver is called with fixes the types of its kernel's parameters, as it does for numba.
+types. What a driver is called with fixes the types of its kernel's parameters, as it does on the CPU.
 """
 
 from __future__ import annotations

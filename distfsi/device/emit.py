@@ -1,13 +1,12 @@
-"""Emission: drivers and all the formulas they reach -> the text of one module, specialised for a scene.
+"""Emission: a driver and all the formulas it reaches, folded for a scene.
 
-The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be
-stale. `device/cuda_text.py` is a second writer of the same folded functions.
+Two writers make texts of them: `device/llvm_text.py` for the CPU and `device/cuda_text.py` for GPUs. What is compiled
+from a text is kept under its hash, so that it can never be stale.
 """
 
 from __future__ import annotations
 
 import ast
-import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -98,7 +97,7 @@ class Emission:
 
     def _constant(self, function: Callable, scope: Bound | None, suffix: str, name: str) -> ast.expr:
         if scope is not None and name in scope.constants:
-            return given(scope.constants[name], f"{scope.owner or suffix}.{name}")
+            return given(scope.constants[name], f"{scope.owner or suffix.removeprefix('__')}.{name}")
         if name in self.constants:
             return given(self.constants[name], name)
         value = function.__globals__[name]
@@ -130,52 +129,6 @@ def _fixed_result(tree: ast.FunctionDef) -> ast.expr | None:
     return copied(tree.body[0].value) if fixed else None
 
 
-class _TypedLiterals(ast.NodeTransformer):
-    """Every float literal becomes a module constant of the real type, so that float32 stays float32."""
-
-    def __init__(self):
-        self.names: dict[str, str] = {}
-
-    def visit_Constant(self, node: ast.Constant):
-        if not isinstance(node.value, float):
-            return node
-        return ast.Name(self.names.setdefault(repr(node.value), f"c{len(self.names)}_"), ast.Load())
-
-
-def numba_text(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str, runtime_version: str
-) -> tuple[str, tuple[float, ...]]:
-    """The module text for one driver, or for a formula as if it were one, and the numbers that it gets behind its other
-    arguments; `real` is "float64" or "float32"."""
-    emission = Emission(constants, bindings)
-    root = emission.root(driver)
-    literals, parts = _TypedLiterals(), []
-    for source, tree in callees_first(emission.functions):
-        text = ast.unparse(literals.visit(tree))
-        kind = "driver" if tree.name == root and source.kind == "formula" else source.kind
-        parts.append(f"# {source.place}\n@{kind}\n{text}")
-    values = [f"{name} = real({_number(value)})" for value, name in literals.names.items()]
-    head = [
-        f"# distfsi kernel module, runtime {runtime_version}",
-        "import numpy as np",
-        "from math import floor, log, pow, sqrt",
-        "from distfsi.device.runtime import driver, formula, helper, load, max_ as max, min_ as min, row, store",
-        f"from distfsi.device.runtime import exp_{real} as exp",
-        f"real = np.{real}",
-        "int32 = np.int32",
-        "",
-        "@helper",
-        "def workspace(n):",
-        "    return np.empty(n, real)",
-    ]
-    text = "\n".join(head) + "\n\n" + "\n".join(values) + "\n\n" + "\n\n".join(parts) + "\n"
-    return text, tuple(emission.numbers.values())
-
-
-def _number(text: str) -> str:
-    return {"inf": "np.inf", "-inf": "-np.inf", "nan": "np.nan"}.get(text, text)
-
-
 def callees_first(
     functions: Mapping[str, tuple[Source, ast.FunctionDef]], roots: Iterable[str] | None = None
 ) -> list[tuple[Source, ast.FunctionDef]]:
@@ -193,11 +146,6 @@ def callees_first(
     for root in [next(reversed(functions))] if roots is None else roots:
         place(root)
     return list(ordered.values())
-
-
-def module_name(driver: Callable, text: str) -> str:
-    """The name under which a module text is stored and cached."""
-    return f"{driver.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
 
 
 def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound] | None = None) -> Callable:

@@ -142,10 +142,10 @@ def flat_names(name: str, record: type) -> list[str]:
     return out
 
 
-def parameters_of(driver: Callable) -> list[str]:
-    """The flat parameters of a driver behind begin and end."""
-    found = Source(driver).parameters.items()
-    return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][2:]
+def parameters_of(function: Callable, first: int = 2) -> list[str]:
+    """The flat parameters of a function from the `first` on: by default those of a driver behind begin and end."""
+    found = Source(function).parameters.items()
+    return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][first:]
 
 
 def flat_values(arguments: Iterable[object]) -> Iterator[object]:
@@ -213,7 +213,27 @@ def given(value: object, label: str) -> ast.expr:
     """The tree of a constant that a scene gives, in which floats other than 0.0 are Numbers of that label."""
     if isinstance(value, tuple):
         return ast.Tuple([given(item, f"{label}[{k}]") for k, item in enumerate(value)], ast.Load())
-    return Number(label, float(value)) if isinstance(value, float) and value != 0.0 else ast.Constant(value)
+    is_number = isinstance(value, float) and value != 0.0
+    return Number(f"given[{label!r}]", float(value)) if is_number else ast.Constant(value)
+
+
+def given_floats(constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> dict[str, float]:
+    """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
+    found: dict[str, float] = {}
+
+    def put(value: object, label: str) -> None:
+        if isinstance(value, tuple):
+            for k, item in enumerate(value):
+                put(item, f"{label}[{k}]")
+        elif isinstance(value, float):
+            found[label] = float(value)
+
+    for name, value in constants.items():
+        put(value, name)
+    for word, bound in bindings.items():
+        for name, value in bound.constants.items():
+            put(value, f"{bound.owner or word}.{name}")
+    return found
 
 
 def is_fixed(node: ast.expr) -> bool:

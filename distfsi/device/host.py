@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from distfsi.device.cache import cache_directory, locked
+from distfsi.device.cache import cache_directory, file_name, locked
 from distfsi.device.cuda_text import dtype_of
 from distfsi.device.gpu import Queue
-from distfsi.device.kernel import Kernel, Launch, file_name
+from distfsi.device.kernel import Kernel, Launch
 
 # No contraction of a * b + c, as on the GPU: the bits are those of the CPU's kernels.
 FLAGS = ("-std=c++20", "-O1", "-ffp-contract=off", "-fwrapv", "-fPIC", "-shared", "-w", "-x", "c++")

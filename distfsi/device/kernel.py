@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -72,8 +71,3 @@ class Kernel:
 
     def _named(self, arguments: Sequence[object]) -> dict[str, object]:
         return dict(zip(parameters_of(self.driver), arguments, strict=False))
-
-
-def file_name(name: str, text: str) -> str:
-    """The name under which what is compiled from a text is kept."""
-    return f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"

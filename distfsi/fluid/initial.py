@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
@@ -120,6 +119,8 @@ class InitialState:
 
     def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
         """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""
+        from scipy.integrate import solve_ivp
+
         reference_of, omega_of = self._references[phase], self._omegas[phase]
 
         def slope(p, rho):

@@ -47,6 +47,7 @@ def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     return field(metadata={"entry": Entry(meaning, None, limits, default)})
 
 
+@dataclass(frozen=True)
 class Law:
     """A law of any kind; `folder` in laws/ holds those of its kind.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pkgutil
 from dataclasses import fields
-from functools import cache
 from importlib import import_module
 
 from distfsi.laws.law import Law
@@ -15,7 +14,6 @@ def word_of(law: type[Law]) -> str:
     return law.__module__.rpartition(".")[2]
 
 
-@cache
 def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
     """The laws in the folder of a kind, those with the fewest fields first."""
     package = import_module(f"distfsi.laws.{kind.folder.replace('/', '.')}")

@@ -1,4 +1,4 @@
-"""What an output directory holds, told from its files: `python -m distfsi info`."""
+"""What an output directory holds, told from its files: `distfsi info`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a run from its files: `python -m distfsi plot`."""
+"""Pictures of a run from its files: `distfsi plot`."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ import re
 from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
@@ -239,6 +238,8 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
 
 
 def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) -> bool:
+    from scipy.spatial import cKDTree
+
     (a, points_of_a), (b, points_of_b) = first, second
     if contains(a.shape, points_of_b).any() or contains(b.shape, points_of_a).any():
         return True

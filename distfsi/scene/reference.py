@@ -1,5 +1,5 @@
 """The reference of the input, written from the schema: `python -m distfsi.scene.reference > docs/input.md`; and the
-schema itself for editors: `python -m distfsi schema > docs/distfsi.schema.json`."""
+schema itself for editors: `distfsi schema > docs/distfsi.schema.json`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from distfsi.device.emit import plain
 from distfsi.device.interface import Columns
@@ -188,6 +187,8 @@ def crack_width(smoothing: float, dimensions: int) -> float:
 
 def concrete_constants(eos: Compaction, strength: Concrete, cracks: bool) -> tuple[float, ...]:
     """The tuple `concrete` of solid/formulas/concrete.py; `cracks`: a failure model limits the tension."""
+    from scipy.optimize import brentq
+
     dense = (0.0, 0.0, 0.0, eos.lock_strain, 0.0, eos.K1, eos.K2, eos.K3)
     full = brentq(
         lambda mu: dense_pressure(mu, dense) - eos.lock_pressure,

@@ -1,4 +1,4 @@
-"""What the compiler makes of each kernel for a GPU: registers, spills, instructions. `python -m distfsi study kernels`.
+"""What the compiler makes of each kernel for a GPU: registers, spills, instructions. `distfsi study kernels`.
 
 It needs NVRTC and a C++ compiler, but no GPU. It writes gpu-kernels.csv: every kernel of all inputs, in float64 and
 float32, and of standard fluids, for each architecture; a text that several of them need stands there once.
@@ -16,22 +16,25 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.errors import InputError
 from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels.regions import pack_cells, unpack_cells
 from distfsi.mesh.kernels.rows import pack_rows
+from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.scene.description import Scene
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
 
 REALS = ("float64", "float32")
-INPUTS = Path("inputs")
+INPUTS = shipped_inputs()
+DIRECTORY = Path("out/study_kernels")
 TIME_STEP = 1e-9
 STEPS_OF_DEBRIS = 8
 CELLS = {1: (256,), 2: (32, 32), 3: (16, 16, 32)}
@@ -150,8 +153,8 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
 
 def calls_of_debris(communicator: Communicator) -> Calls:
     """What particles call only where they fail, or near other ranks."""
-    team = Listening()
-    simulation = Simulation.of(works.bursting_ball(), communicator, device=team)
+    device = Listening()
+    simulation = Simulation.of(works.bursting_ball(), communicator, device=device)
     for _ in range(STEPS_OF_DEBRIS):
         simulation.step()
     rows, reals = np.zeros(1, np.int64), [np.zeros(1, real) for real in REALS]
@@ -159,7 +162,7 @@ def calls_of_debris(communicator: Communicator) -> Calls:
     packed += [(pack_cells, (rows, rows, rows, 1, values, 1, 1, values)) for values in reals]
     packed += [(unpack_cells, (rows, 1, 1, values, 1, 1, values)) for values in reals]
     kernels = [(Kernel(driver, {}, {}, "float64"), arguments) for driver, arguments in packed]
-    return team.calls | {key_of(*call): call for call in kernels}
+    return device.calls | {key_of(*call): call for call in kernels}
 
 
 @dataclass
@@ -257,18 +260,39 @@ def rows(text: str, of: Text, architectures: Sequence[str] = ARCHITECTURES) -> I
         }
 
 
-def main(communicator: Communicator, overrides: list[str]) -> None:
-    """Write gpu-kernels.csv and print the stage's part of it."""
-    path, found = Path("gpu-kernels.csv"), texts({**shipped(INPUTS), **standard()}, communicator)
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """The kernels of Sod's tube for one architecture."""
+    _study(communicator, overrides, {"sod": load(INPUTS / "sod.toml")}, ("sm_90",))
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Write gpu-kernels.csv into DIRECTORY and print the stage's part of it."""
+    _study(communicator, overrides, {**shipped(INPUTS), **standard()}, ARCHITECTURES)
+
+
+def _study(
+    communicator: Communicator,
+    overrides: Sequence[str],
+    scenes: Mapping[str, Scene],
+    architectures: Sequence[str],
+) -> None:
+    if communicator.size > 1 or overrides:
+        raise InputError(["study kernels: runs on one rank and takes no overrides"])
+    try:
+        compiler = nvrtc.version()
+    except nvrtc.CompileError as error:
+        raise InputError([f"study kernels: {error}"]) from error
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    path, found = DIRECTORY / "gpu-kernels.csv", texts(scenes, communicator)
     with open(path, "w", newline="") as file, ThreadPoolExecutor() as pool:
         writer = None
-        for rows_of_text in pool.map(lambda item: [*rows(*item)], found.items()):
+        for rows_of_text in pool.map(lambda item: [*rows(*item, architectures)], found.items()):
             for row in rows_of_text:
                 writer = writer or _begun(file, row)
                 writer.writerow(row)
                 if row["kernel"] == "advance_tiles":
                     print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
-    print(f"{path}, by NVRTC {nvrtc.version()}")
+    print(f"{path}, by NVRTC {compiler}")
 
 
 def _begun(file: Any, row: dict[str, Any]) -> csv.DictWriter:

@@ -11,14 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study import fitted_cylinder, fitted_liftoff
 from distfsi.study.references import LIFTOFF
-from distfsi.study.tracks import Measure, Tracks, follow, write_tracks
+from distfsi.study.tracks import Measure, Tracks, record_tracks, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "liftoff.toml"
+INPUT = shipped_inputs() / "liftoff.toml"
 DIRECTORY = Path("out/study_liftoff")
 CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many particles
 STEPS_BETWEEN_SAMPLES = 5
@@ -45,9 +47,10 @@ SURROUNDINGS = {
 
 def measure_of(simulation: Simulation) -> Measure:
     """Centre and velocity of the cylinder."""
+    solid = present(simulation.solid)
 
     def measure() -> Mapping[str, float]:
-        body = simulation.solid.body_totals(0)
+        body = solid.body_totals(0)
         (x, y), (u, v) = body["center"], body["momentum"] / body["mass"]
         return {"x": float(x), "y": float(y), "u": float(u), "v": float(v)}
 
@@ -59,7 +62,7 @@ def run(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tra
     size = [f"domain.cells=[{5 * cells},{cells}]", f"solid.bodies.cylinder.spacing={0.1 / cells!r}"]
     scene = load(INPUT, [*size, f'output.directory="{DIRECTORY / str(cells)}"', *overrides])
     times = [instant.time for instant in LIFTOFF]
-    return follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
+    return record_tracks(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
 
 
 def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tracks:
@@ -71,7 +74,7 @@ def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str])
 
 def lift_raised(end: float, cells: int = RAISED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_liftoff.lift(RAISED, body.density, end, cells)._asdict()
 
 
@@ -90,27 +93,26 @@ def throw(communicator: Communicator, around: Surroundings, cells: int, override
         f"solid.bodies.cylinder.spacing={0.5 * h!r}",
         f'output.directory="{DIRECTORY / f"thrown_{cells}"}"',
     ]
-    return follow(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
+    return record_tracks(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
 
 
 def flight(around: Surroundings, end: float, cells: int = FITTED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_cylinder.fly(around.mesh(cells), body.density, end)._asdict()
 
 
 def centres(tracks: Tracks) -> list[tuple[float, float]]:
     """(x, y) at the times of the references; NaN where the run does not reach them."""
     latest = tracks["time"][-1] * (1.0 + 1e-9)
-    return [
-        tuple(float(np.interp(r.time, tracks["time"], tracks[axis])) if r.time <= latest else np.nan for axis in "xy")
-        for r in LIFTOFF
-    ]
+    times = [r.time if r.time <= latest else np.nan for r in LIFTOFF]
+    x, y = (np.interp(times, tracks["time"], tracks[axis]) for axis in "xy")
+    return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def row(name: str, places: Sequence[tuple[float, float]]) -> str:
+def row(name: str, positions: Sequence[tuple[float, float]]) -> str:
     """A line of the table."""
-    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in places)
+    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in positions)
 
 
 def draw(runs: Mapping[int, Tracks]) -> None:
