@@ -12,23 +12,22 @@ from distfsi.coupling.kernels import spreading as push
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.solid.kernels import bonds, contact
-from distfsi.solid.kernels import pairs as solid
+from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs
 from launch import ROOT
 from side_by_side import SideBySide
 
 ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 # Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
-FAILING = ("crack", "cut", "look_around", "mark_damaged")
-NOT_REACHED = (*FAILING, "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
-FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
+FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_debris", "open_voids")
+NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "drop_tension")
+FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
 CUT_CELLS = (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images, push, wall_distance)
 SCHEMES = {"paper": (coupling, push), "cut_cells": CUT_CELLS}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
 OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_evicted"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
-ALWAYS |= {"find_neighbours", "push"}
+ALWAYS |= {"find_neighbours", "apply_impulse"}
 
 AIR = '{ eos = "ideal_gas", gamma = 1.4 }'
 TNT = '{ eos = "jwl", rho0 = 1630, A = 3.712e11, B = 3.21e9, R1 = 4.15, R2 = 0.95, omega = 0.3 }'

@@ -76,7 +76,7 @@ def allowed(layer: str, kind: str, name: str) -> bool:
     """Whether files of a `kind` in a `layer` may import `name`."""
     top, *inner = name.split(".")
     if top != "distfsi":
-        return top == "math" if kind != "parts" else ONLY_IN.get(top, layer) == layer
+        return top in ("math", "typing") if kind != "parts" else ONLY_IN.get(top, layer) == layer
     if kind == "formulas" and not {*FORMULAS} & {*inner}:
         return False
     if kind == "kernels" and not {*KERNELS} & {*inner}:

@@ -11,7 +11,7 @@ from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.fluid.kernels.stage import place
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
-from distfsi.solid.kernels.pairs import DENSITY, MASS, VELOCITY
+from distfsi.solid.kernels.records import DENSITY, MASS, VELOCITY
 
 # ---- regions --------------------------------------------------------------------------------------------------------
 
