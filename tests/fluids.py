@@ -3,7 +3,10 @@
 from types import SimpleNamespace
 
 from distfsi.fluid.model import FluidModel, fluid_model
-from distfsi.scene.description import Fluid, IdealGas, Jwl, Phase, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.scene.description import Fluid, Phase
 
 AIR = IdealGas(1.4)
 HELIUM = IdealGas(1.667)

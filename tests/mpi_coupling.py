@@ -9,13 +9,17 @@ from itertools import product
 
 import numpy as np
 
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
 from distfsi.simulation import Simulation
 
 SCHEMES = ("paper", "cut_cells")
-AIR = (d.Phase("air", d.IdealGas(1.4)),)
-AIR_AND_WATER = (*AIR, d.Phase("water", d.StiffenedGas(4.4, 60.0)))
+AIR = (d.Phase("air", IdealGas(1.4)),)
+AIR_AND_WATER = (*AIR, d.Phase("water", StiffenedGas(4.4, 60.0)))
 
 
 def gas(density, pressure, velocity, phase=0):
@@ -30,8 +34,8 @@ def body(shape, spacing, density, velocity, fixed=None, stiffness=50.0):
         spacing,
         density,
         tuple(map(float, velocity)),
-        d.LinearEos(stiffness),
-        d.Elastic(0.4 * stiffness),
+        LinearEos(stiffness),
+        Elastic(0.4 * stiffness),
         fixed,
     )
 

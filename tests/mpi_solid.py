@@ -9,15 +9,21 @@ import math
 import numpy as np
 
 from distfsi.device.cpu import Team
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
 from distfsi.solid.solid import Solid
 
-COPPER_EOS = d.MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
-COPPER = d.JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
-SOFT_EOS = d.LinearEos(bulk_modulus=3.25e9)
-SOFT = d.PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
+COPPER_EOS = MieGrueneisen(c0=3940.0, s1=1.489, s2=0.0, s3=0.0, gamma0=2.0, a=0.47)
+COPPER = JohnsonCook(45e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 294.0, 1356.0, 385.0, 0.9)
+SOFT_EOS = LinearEos(bulk_modulus=3.25e9)
+SOFT = PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
 
 
 def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None, failure=None):
@@ -109,7 +115,7 @@ def bonded_discs(team):
 
 def bursting_ball(team, communicator=None):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
-    failure = d.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, d.Scatter(10.0, 0.1, 1))
+    failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, Scatter(10.0, 0.1, 1))
     ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
     box = (-1.0, -1.0, 0.0), (1.0,) * 3, (2,)
     part = solid([ball], *box, team, 2, form="total_lagrangian", communicator=communicator)

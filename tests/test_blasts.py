@@ -2,7 +2,8 @@
 
 import pytest
 
-from distfsi.scene.description import FluidState, IdealGas, Region
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.scene.description import FluidState, Region
 from distfsi.study.exact_cases import half_way, radial_mean
 from fluids import AIR
 from tubes import advance, fields, radii, scene_of, start

@@ -8,20 +8,15 @@ import numpy as np
 import pytest
 
 from distfsi.device.cpu import Team
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.failure.principal_stress import PrincipalStress
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.mesh.communicator import Communicator
-from distfsi.scene.description import (
-    Ball,
-    Box,
-    Elastic,
-    HalfSpace,
-    JohnsonCookFailure,
-    LinearEos,
-    NoStrength,
-    PerfectlyPlastic,
-    PrincipalStress,
-    Scatter,
-    Tube,
-)
+from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from distfsi.scene.loader import load
 from distfsi.simulation import Simulation
 from launch import ROOT

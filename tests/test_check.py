@@ -12,11 +12,13 @@ from distfsi.commands import bench
 from distfsi.commands.check import report
 from distfsi.commands.resources import Resources
 from distfsi.commands.works import SMALLEST, blast_on_copper, gases
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
 from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.advice import advice
-from distfsi.scene.description import IdealGas, Jwl, StiffenedGas
 from distfsi.scene.signals import Layout, moving_share, steps, sub_steps
 from distfsi.scene.waves import Side, meet
 from distfsi.simulation import Simulation, deal_blocks

@@ -16,6 +16,12 @@ from distfsi.coupling.formulas import apertures
 from distfsi.coupling.formulas import drag as physics_drag
 from distfsi.coupling.kernels.cells import FLUID
 from distfsi.device.emit import plain
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.failure.principal_stress import PrincipalStress
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.scene import description as d
 from distfsi.scene.description import Ball, Box, HalfSpace
 from distfsi.solid import solid as solid_part
@@ -500,7 +506,7 @@ TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in (
 @pytest.mark.parametrize(("thickness", "ratio"), TORN)
 def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
     """Its bonds break, gas passes, no state is negative, and all books close."""
-    h, fails = 1.0 / 24, d.PrincipalStress(1.0, 1e-3, d.Scatter(8.0, 1.0 / 24, 1))
+    h, fails = 1.0 / 24, PrincipalStress(1.0, 1e-3, Scatter(8.0, 1.0 / 24, 1))
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(sqrt(ratio), ratio, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
@@ -593,7 +599,7 @@ def test_a_weak_wave_in_water_takes_lone_particles_along(dimensions):
     """With (1 + C) rho/(rho_s + C rho) of its velocity, the added mass being C rho (Landau, Lifshitz, Fluid Mechanics,
     Sec. 11): those that are lighter are faster than the water."""
     D, c, across = dimensions, sqrt(4.4 * 61.0), (0.0,) * (dimensions - 1)
-    densities, water = (0.1, 1.0, 7.8), (d.Phase("water", d.StiffenedGas(4.4, 60.0)),)
+    densities, water = (0.1, 1.0, 7.8), (d.Phase("water", StiffenedGas(4.4, 60.0)),)
     places = [(0.5, 0.05 + 0.1 * n, 0.14)[:D] for n in range(len(densities))]
     specks = [speck(x, 0.001, density, (0.0, *across)) for x, density in zip(places, densities, strict=True)]
     u = 1e-6 * c
@@ -776,7 +782,7 @@ def plate_in_water(lightness, cells, stiffness, base, over):
     plate = body(Box((low,), (low + cells * h,)), 0.5 * h, lightness * rho, (0,), stiffness=stiffness)
     wave = gas(rho * (1.0 + over / (4.4 * (base + 6e8))), base + over, (over / (rho * c),))
     regions = [(gas(rho, base, (0,)), None), (wave, Box((0.0,), (0.4,)))]
-    water = (d.Phase("water", d.StiffenedGas(4.4, 6e8)),)
+    water = (d.Phase("water", StiffenedGas(4.4, 6e8)),)
     case = coupled([plate], regions, (0.0,), (1.0,), (n,), (OPEN,), block=n, phases=water, cfl=0.9, runge_kutta="rk2")
     return case, rho * c, c, lightness * rho * cells * h
 
@@ -819,10 +825,10 @@ def test_a_wave_in_water_goes_on_into_elastic_steel():
     rho, base, over, n, sound = 1000.0, 1e5, 1e6, 100, 5960.0
     c, shear = sqrt(4.4 * (base + 6e8) / rho), 80e9
     bulk, h = 7830.0 * sound**2 - 4.0 / 3.0 * shear, 1.0 / n
-    steel = replace(body(Box((0.3,), (1.3,)), 0.5 * h, 7830.0, (0,)), eos=d.LinearEos(bulk), strength=d.Elastic(shear))
+    steel = replace(body(Box((0.3,), (1.3,)), 0.5 * h, 7830.0, (0,)), eos=LinearEos(bulk), strength=Elastic(shear))
     density, velocity = rho * (1.0 + over / (4.4 * (base + 6e8))), over / (rho * c)
     regions = [(gas(rho, base, (0,)), None), (gas(density, base + over, (velocity,)), Box((0.0,), (0.2,)))]
-    water = (d.Phase("water", d.StiffenedGas(4.4, 6e8)),)
+    water = (d.Phase("water", StiffenedGas(4.4, 6e8)),)
     kinds = (("outflow", "wall"),)
     case = coupled([steel], regions, (0.0,), (1.0,), (n,), kinds, block=n, phases=water, form="total_lagrangian")
     while case.simulation.time < 0.1 / c + 0.5 / sound:
@@ -851,7 +857,7 @@ def test_an_exponential_wave_in_water_throws_a_plate_as_taylor_says(psi):
     h, low, n = c * latest / 40, -1.5 * c * latest, 80
     mass, thickness = rho * c * theta / psi, 6 * h
     sound = 100.0 * thickness / latest
-    phases = (d.Phase("air", d.IdealGas(1.4)), d.Phase("water", d.StiffenedGas(4.4, 6e8)))
+    phases = (d.Phase("air", IdealGas(1.4)), d.Phase("water", StiffenedGas(4.4, 6e8)))
     plate = body(Box((0.0,), (thickness,)), 0.5 * h, mass / thickness, (0,), stiffness=mass / thickness * sound**2)
     water = (gas(rho, base, (0,), 1), Box((low,), (0.5 * thickness,)))
     case = coupled(

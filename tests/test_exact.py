@@ -8,7 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from distfsi.scene.description import IdealGas, Jwl, MieGrueneisen, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.study import references
 from distfsi.study.exact import (
     LEFTWARD,

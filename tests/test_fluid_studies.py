@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from distfsi.__main__ import main
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.scatter import Point, draw_scatter
-from distfsi.scene.description import StiffenedGas
 from distfsi.study import choices, exact_cases, frontier_fluid, stability_fluid
 from distfsi.study.exact import PureState
 from distfsi.study.problems import EXPLOSION, PROBLEMS, SOD

@@ -8,15 +8,25 @@ from scipy.integrate import solve_ivp
 
 from distfsi.device import cpu
 from distfsi.device.interface import Columns
+from distfsi.laws.solid.eos.compaction import Compaction
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.failure.principal_stress import PrincipalStress
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.concrete import Concrete
+from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.linear_hardening import LinearHardening
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.scene import description as d
 from distfsi.solid.formulas import concrete, damage, strength
 from distfsi.solid.kernels.material import deform
 from distfsi.solid.materials import Materials, concrete_constants, crack_width, weibull
 
-STEEL = d.JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
-STEEL_EOS = d.LinearEos(160e9)
-HJC_EOS = d.Compaction(16e6, 0.001, 0.80e9, 0.10, 85e9, -171e9, 208e9)
-HJC = d.Concrete(14.86e9, 48e6, 4e6, 0.79, 1.60, 0.61, 0.007, 7.0, 0.04, 1.0, 0.01, 1.0)
+STEEL = JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
+STEEL_EOS = LinearEos(160e9)
+HJC_EOS = Compaction(16e6, 0.001, 0.80e9, 0.10, 85e9, -171e9, 208e9)
+HJC = Concrete(14.86e9, 48e6, 4e6, 0.79, 1.60, 0.61, 0.007, 7.0, 0.04, 1.0, 0.01, 1.0)
 WIDTH = crack_width(1.3, 3)  # spacings
 TENSION, SHEAR = np.diag([1.0, 0.0, 0.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -86,7 +96,7 @@ def test_a_cycle_of_shear_follows_the_independent_integration():
 
 def test_linear_hardening_is_exact_in_uniaxial_strain():
     G, Y, H, K = 77e9, 400e6, 3e9, 160e9
-    point, strain = Point(STEEL_EOS, d.LinearHardening(G, Y, H)), 0.02
+    point, strain = Point(STEEL_EOS, LinearHardening(G, Y, H)), 0.02
     for _ in range(100):
         point.strain(1e-8, strain / 100 / 1e-8 * TENSION)
     plastic = (2.0 * G * strain - Y) / (3.0 * G + H)
@@ -96,7 +106,7 @@ def test_linear_hardening_is_exact_in_uniaxial_strain():
 
 
 def test_a_closed_elastic_cycle_comes_back():
-    point = Point(STEEL_EOS, d.Elastic(77e9), rate="green_naghdi")
+    point = Point(STEEL_EOS, Elastic(77e9), rate="green_naghdi")
     for sign in (1.0, -1.0):
         for _ in range(200):
             point.strain(1e-8, sign * 1e5 * (SHEAR + 0.3 * TENSION))
@@ -105,7 +115,7 @@ def test_a_closed_elastic_cycle_comes_back():
 
 @pytest.mark.parametrize("rate", ["jaumann", "green_naghdi"])
 def test_a_rigid_turn_of_a_strained_point_keeps_its_stress(rate):
-    point = Point(STEEL_EOS, d.Elastic(77e9), rate=rate).strain(1e-6, 1e4 * TENSION)
+    point = Point(STEEL_EOS, Elastic(77e9), rate=rate).strain(1e-6, 1e4 * TENSION)
     before = point.deviator.copy()
     for _ in range(720):
         point.strain(1.0, 2.0 * math.pi / 720 * (SHEAR - SHEAR.T))
@@ -118,8 +128,8 @@ NO_RATE = {"D3": 0.0, "D4": 0.0, "D5": 0.0, "reference_rate": 1.0, "spall_streng
 
 
 def test_shear_fails_at_the_fracture_strain_and_not_before():
-    failure = d.JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
-    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure)
+    failure = JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
+    point = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure)
     while point.plastic_strain[0] < 0.1999:
         point.strain(1e-8, 1e4 * (SHEAR + SHEAR.T))
         assert point.damage[0] == 0.0
@@ -148,8 +158,8 @@ def test_johnson_cook_fracture_strain(triaxiality, rate, temperature, strain):
 
 
 def test_crushing_uses_nothing_up():
-    failure = d.JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
-    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure)
+    failure = JohnsonCookFailure(D1=0.05, D2=0.15, fracture_energy=0.0, **NO_RATE)
+    point = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure)
     for _ in range(1000):
         point.strain(1e-8, -2e4 * TENSION)
     assert point.plastic_strain[0] > 0.1
@@ -160,8 +170,8 @@ def test_crushing_uses_nothing_up():
 def test_a_crack_takes_its_energy_at_any_spacing(spacing):
     """Ductile in shear: work on a particle after the fracture strain, times its size, is the fracture energy."""
     energy, dt, rate = 2e4, 2e-9, 1e4
-    failure = d.JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
-    point = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing)
+    failure = JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
+    point = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing)
     work = 0.0
     while point.damage[0] < 1.0:
         before, worn = point.deviator[0, 3], point.wear[0] >= 1.0
@@ -174,8 +184,8 @@ def test_a_crack_takes_its_energy_at_any_spacing(spacing):
 def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
     """The work of the mean tension counts as that of plastic flow does; the elastic energy of shear does not."""
     energy, dt, width = 2e4, 2e-9, WIDTH * spacing
-    failure = d.JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
-    point, work = Point(STEEL_EOS, d.PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing), 0.0
+    failure = JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
+    point, work = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing), 0.0
     point.wear[:] = 1.0
     while point.damage[0] < 1.0:
         before, density = point.normal_stress[0], point.density[0]
@@ -188,8 +198,8 @@ def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
 @pytest.mark.parametrize("aside", [0.0, -0.2, 1.0], ids=["held", "free to contract", "pulled on all sides"])
 def test_a_brittle_crack_takes_its_energy_at_any_spacing(spacing, aside):
     K, G, strength, energy = 16e9, 12e9, 4e6, 20.0
-    failure = d.PrincipalStress(strength, energy, None)
-    point, work, peak = Point(d.LinearEos(K), d.Elastic(G), failure=failure, spacing=spacing), 0.0, 0.0
+    failure = PrincipalStress(strength, energy, None)
+    point, work, peak = Point(LinearEos(K), Elastic(G), failure=failure, spacing=spacing), 0.0, 0.0
     strain = 2e-7 * np.diag([1.0, aside, aside])
     while point.damage[0] < 1.0:
         before = point.deviator[0, :3] - point.pressure[0]
@@ -201,7 +211,7 @@ def test_a_brittle_crack_takes_its_energy_at_any_spacing(spacing, aside):
 
 
 def test_a_failed_particle_carries_pressure_only():
-    point = Point(STEEL_EOS, d.Elastic(77e9), failure=d.PrincipalStress(1e9, 0.0, None))
+    point = Point(STEEL_EOS, Elastic(77e9), failure=PrincipalStress(1e9, 0.0, None))
     while point.damage[0] < 1.0:
         point.strain(1e-8, 1e4 * TENSION)
     for _ in range(20):
@@ -237,7 +247,7 @@ def test_the_largest_principal_value_of_a_deviator(D):
 
 @pytest.mark.parametrize("modulus", [2.0, 10.0])
 def test_scatter_is_weibulls_and_the_weakest_link_of_a_volume_does_not_know_the_spacing(modulus):
-    scatter = d.Scatter(modulus, 2e-3, 3)
+    scatter = Scatter(modulus, 2e-3, 3)
     fine = weibull(scatter, np.arange(64 * 4000), np.full(64 * 4000, 0.5e-3**3), 3)
     coarse = weibull(scatter, np.arange(4000), np.full(4000, 2e-3**3), 3)
     weakest = fine.reshape(4000, 64).min(axis=1)
@@ -250,9 +260,9 @@ def test_scatter_is_weibulls_and_the_weakest_link_of_a_volume_does_not_know_the_
 
 def test_scatter_depends_on_seed_and_id_alone():
     ids, volume = np.array([7, 3, 100000]), np.full(3, 1e-9)
-    one = weibull(d.Scatter(5.0, 1e-3, 1), ids, volume, 3)
-    assert np.array_equal(one[::-1], weibull(d.Scatter(5.0, 1e-3, 1), ids[::-1], volume, 3))
-    assert not np.any(one == weibull(d.Scatter(5.0, 1e-3, 2), ids, volume, 3))
+    one = weibull(Scatter(5.0, 1e-3, 1), ids, volume, 3)
+    assert np.array_equal(one[::-1], weibull(Scatter(5.0, 1e-3, 1), ids[::-1], volume, 3))
+    assert not np.any(one == weibull(Scatter(5.0, 1e-3, 2), ids, volume, 3))
 
 
 # ---- concrete --------------------------------------------------------------------------------------------------------
@@ -316,7 +326,7 @@ def test_shear_wears_concrete_out_and_leaves_friction():
 
 
 def test_concrete_cracks_in_tension_and_carries_again_when_the_crack_is_closed():
-    failure = d.PrincipalStress(3.6e6, 80.0, None)
+    failure = PrincipalStress(3.6e6, 80.0, None)
     point, peak = Point(HJC_EOS, HJC, 2440.0, failure, spacing=5e-3), 0.0
     while point.damage[0] < 1.0:
         point.strain(1.0, 2e-6 * TENSION)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from distfsi.diagnostics.budget import Budget
-from distfsi.scene.description import Box, FluidState, IdealGas, Performance, Region
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.scene.description import Box, FluidState, Performance, Region
 from fluids import AIR, WATER, model_of
 from tubes import OPEN, advance, fields, scene_of, start
 

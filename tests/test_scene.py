@@ -8,17 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from distfsi.errors import InputError
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.linear_hardening import LinearHardening
+from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.scene import load, schema
-from distfsi.scene.description import (
-    Ball,
-    JohnsonCook,
-    JohnsonCookFailure,
-    Jwl,
-    LinearHardening,
-    NoStrength,
-    Scatter,
-    StiffenedGas,
-)
+from distfsi.scene.description import Ball
 from distfsi.scene.reference import markdown
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
 from distfsi.scene.units import UNITS, parse_unit, to_si

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, LinearEos, NoStrength, Tube
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, Tube
 from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import bounding_box, cell_fractions, contains, dimensions, distance, volume
 

@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from distfsi.scene.description import Ball, Box, Elastic, HalfSpace, LinearEos, NoStrength, Tube
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from distfsi.study.stability_solid import pieces
 from launch import run_ranks
 from mpi_solid import COPPER_EOS, SOFT, SOFT_EOS, body, solid, step

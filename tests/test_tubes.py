@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from distfsi.scene.description import Ball, Box, FluidState, IdealGas, Jwl, Performance, Region, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.scene.description import Ball, Box, FluidState, Performance, Region
 from distfsi.study.exact import PureState, wave_into
 from distfsi.study.references import TNT_PRESSURE
 from fluids import AIR, TNT, WATER

@@ -6,19 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.scene.description import (
-    Box,
-    Domain,
-    Fluid,
-    FluidEos,
-    FluidState,
-    Output,
-    Performance,
-    Phase,
-    Region,
-    Scene,
-    Time,
-)
+from distfsi.laws.law import FluidEos
+from distfsi.scene.description import Box, Domain, Fluid, FluidState, Output, Performance, Phase, Region, Scene, Time
 from distfsi.simulation import Simulation
 from distfsi.study.exact import PureState, RiemannSolution, exact_riemann
 from distfsi.study.problems import centers, fields, start

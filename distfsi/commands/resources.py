@@ -12,8 +12,10 @@ from scipy import ndimage, optimize
 from distfsi.commands.works import SMOOTHING
 from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.blocks import Blocks
-from distfsi.scene.description import IdealGas, Scene, StiffenedGas
+from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_steps
 from distfsi.simulation import deal_blocks

@@ -7,13 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.scene import description as scene
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
 
-AIR, HELIUM, WATER = scene.IdealGas(1.4), scene.IdealGas(1.67), scene.StiffenedGas(4.4, 6e8)
-TNT = scene.Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
-COPPER = scene.MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
-COPPER_STRENGTH = scene.JohnsonCook(46e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 293.0, 1356.0, 383.0, 0.9)
+AIR, HELIUM, WATER = IdealGas(1.4), IdealGas(1.67), StiffenedGas(4.4, 6e8)
+TNT = Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
+COPPER = MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
+COPPER_STRENGTH = JohnsonCook(46e9, 90e6, 292e6, 0.31, 0.025, 1.09, 1.0, 293.0, 1356.0, 383.0, 0.9)
 SMOOTHING = 1.3
 BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressure
 
@@ -66,8 +75,8 @@ def blast_on_plates(cells: int, dimensions: int, side: float, count: int, pitch:
 
 def bursting_ball() -> scene.Scene:
     """Half a ball of bonded particles that flies apart at a symmetry plane: bonds are cut, there is debris."""
-    failure = scene.JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, 2e8, 0.0, scene.Scatter(10.0, 0.1, 1))
-    eos, strength = scene.LinearEos(3.25e9), scene.PerfectlyPlastic(0.7e9, 2e7)
+    failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, 2e8, 0.0, Scatter(10.0, 0.1, 1))
+    eos, strength = LinearEos(3.25e9), PerfectlyPlastic(0.7e9, 2e7)
     rest, shape = (0.0,) * 3, scene.Ball((0.0,) * 3, 0.4)
     ball = scene.Body("ball", shape, 0.1, 2000.0, rest, eos, strength, None, failure, radial_velocity=300.0)
     sides = (("outflow", "outflow"),) * 2 + (("symmetry", "outflow"),)

@@ -1,13 +1,13 @@
 """From the words of a scene to formulas: the only place where a name in the input meets a function.
 
-A new equation of state: one file in physics/eos/, one case in `fluid_eos`, one description in scene/.
+A new equation of state is one file in laws/fluid/.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, singledispatch
+from functools import cached_property
 
 import numpy as np
 
@@ -15,8 +15,10 @@ from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
-from distfsi.laws.fluid import jwl, stiffened_gas
-from distfsi.scene.description import Fluid, IdealGas, Jwl, Scene, StiffenedGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
+from distfsi.scene.description import Fluid, Scene
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
     "first_order": (reconstruction.muscl, limiters.first_order, 2),
@@ -34,42 +36,29 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 
 @dataclass(frozen=True)
-class FluidEos:
-    """p = reference(rho) + omega rho e, as a formula with its constants."""
+class PhaseFormulas:
+    """p = reference(rho) + omega rho e of a phase, outside the kernels."""
 
-    reference: Bound
-    omega: float
-    closed_form: bool
+    eos: FluidEos
+
+    @property
+    def omega(self) -> float:
+        """Grueneisen coefficient."""
+        return self.eos.omega if isinstance(self.eos, Jwl) else self.eos.gamma - 1.0
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether the reference pressure is constant."""
+        return not isinstance(self.eos, Jwl)
 
     def evaluate(self, rho: float) -> tuple[float, float]:
-        """Reference pressure [Pa] and its slope with density, outside the kernels."""
-        return self._plain_reference(rho)
+        """Reference pressure [Pa] and its slope with density."""
+        return self._reference(rho)
 
     @cached_property
-    def _plain_reference(self) -> Callable[[float], tuple[float, float]]:
-        return plain(self.reference.function, self.reference.constants)
-
-
-@singledispatch
-def fluid_eos(eos: object) -> FluidEos:
-    """The formula of an equation of state of the input."""
-    raise TypeError(f"no formula for {eos}")
-
-
-@fluid_eos.register
-def _(eos: IdealGas) -> FluidEos:
-    return fluid_eos(StiffenedGas(eos.gamma, 0.0))
-
-
-@fluid_eos.register
-def _(eos: StiffenedGas) -> FluidEos:
-    return FluidEos(Bound(stiffened_gas.reference, {"GAMMA": eos.gamma, "P_INF": eos.p_inf}), eos.gamma - 1.0, True)
-
-
-@fluid_eos.register
-def _(eos: Jwl) -> FluidEos:
-    constants = {"RHO0": eos.rho0, "A": eos.A, "B": eos.B, "R1": eos.R1, "R2": eos.R2, "OMEGA": eos.omega}
-    return FluidEos(Bound(jwl.reference, constants), eos.omega, False)
+    def _reference(self) -> Callable[[float], tuple[float, float]]:
+        bound = Bound.of(self.eos, "reference")
+        return plain(bound.function, bound.constants)
 
 
 @dataclass(frozen=True)
@@ -81,7 +70,7 @@ class FluidModel:
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
-    eos: tuple[FluidEos, ...]
+    eos: tuple[PhaseFormulas, ...]
     dimensions: int
 
     @property
@@ -112,7 +101,7 @@ def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
     fluid: Fluid = scene.fluid
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
-    eos = tuple(fluid_eos(phase.eos) for phase in fluid.phases)
+    eos = tuple(PhaseFormulas(phase.eos) for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
@@ -145,9 +134,10 @@ def fluid_model(scene: Scene) -> FluidModel:
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
     bindings |= {name: Bound(function) for name, function in solver}
-    for k, (e, stored) in enumerate(zip(eos, _stored_references(fluid, eos), strict=True), 1):
-        bindings[f"reference_{k}"] = replace(e.reference, owner=f"phase {k}")
-        bindings[f"stored_reference_{k}"] = replace(stored, owner=f"phase {k}")
+    for k, phase in enumerate(fluid.phases):
+        owner = f"phase {k + 1}"
+        bindings[f"reference_{k + 1}"] = Bound.of(phase.eos, "reference", owner)
+        bindings[f"stored_reference_{k + 1}"] = _stored_reference(fluid, k, owner)
     return FluidModel(constants, bindings, eos, dimensions)
 
 
@@ -156,14 +146,11 @@ def ghost_layers(scene: Scene) -> int:
     return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
 
 
-def _stored_references(fluid: Fluid, eos: tuple[FluidEos, ...]) -> list[Bound]:
-    """In float32 the energies of stiffened gases are counted from those of their first state without pressure."""
-    found = []
-    for k, (phase, formula) in enumerate(zip(fluid.phases, eos, strict=True)):
-        first = next((region.state for region in fluid.regions if region.state.phase == k), None)
-        shifted = fluid.precision == "float32" and isinstance(phase.eos, StiffenedGas) and first is not None
-        rest = {"REST_DENSITY": first.density} if shifted else {}
-        found.append(
-            Bound(stiffened_gas.shifted_reference, formula.reference.constants | rest) if shifted else formula.reference
-        )
-    return found
+def _stored_reference(fluid: Fluid, k: int, owner: str) -> Bound:
+    """In float32 the energies of a stiffened gas are counted from those of its first state without pressure."""
+    eos = fluid.phases[k].eos
+    first = next((region.state for region in fluid.regions if region.state.phase == k), None)
+    if fluid.precision == "float32" and isinstance(eos, StiffenedGas) and first is not None:
+        bound = Bound.of(eos, "shifted_reference", owner)
+        return replace(bound, constants={**bound.constants, "REST_DENSITY": first.density})
+    return Bound.of(eos, "reference", owner)

@@ -10,13 +10,13 @@ from collections.abc import Container, Iterator, Mapping
 import numpy as np
 from scipy.spatial import cKDTree
 
+from distfsi.laws.solid.eos.compaction import Compaction
+from distfsi.laws.solid.strength.concrete import Concrete
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
     Ball,
     Body,
     Box,
-    Compaction,
-    Concrete,
     Cylinder,
     Domain,
     Fluid,

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from distfsi.laws.law import Failure, FluidEos, SolidEos, Strength
+
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
 RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
@@ -73,36 +75,6 @@ Shape = Box | Ball | HalfSpace | Tube | Cylinder
 
 
 @dataclass(frozen=True)
-class IdealGas:
-    """p = (gamma - 1) rho e."""
-
-    gamma: float
-
-
-@dataclass(frozen=True)
-class StiffenedGas:
-    """p = (gamma - 1) rho e - gamma p_inf (paper, Eq. 14 corrected)."""
-
-    gamma: float
-    p_inf: float
-
-
-@dataclass(frozen=True)
-class Jwl:
-    """p = A(1 - w/(R1 v)) exp(-R1 v) + B(1 - w/(R2 v)) exp(-R2 v) + w rho e, v = rho0/rho (paper, Eq. 13)."""
-
-    rho0: float
-    A: float
-    B: float
-    R1: float
-    R2: float
-    omega: float
-
-
-FluidEos = IdealGas | StiffenedGas | Jwl
-
-
-@dataclass(frozen=True)
 class Phase:
     """One of the fluid's materials."""
 
@@ -148,148 +120,6 @@ class Fluid:
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class MieGrueneisen:
-    """Shock EOS, U = c0 + s1 u (+ s2, s3), Grueneisen gamma0 + a mu, energy per reference volume (A.1 corrected)."""
-
-    c0: float
-    s1: float
-    s2: float
-    s3: float
-    gamma0: float
-    a: float
-
-
-@dataclass(frozen=True)
-class LinearEos:
-    """p = K (rho/rho0 - 1)."""
-
-    bulk_modulus: float
-
-
-@dataclass(frozen=True)
-class Compaction:
-    """Concrete's pressure: elastic to the crush point, pores closing up to the lock pressure, then dense with
-    p = K1 x + K2 x^2 + K3 x^3, x = (mu - lock_strain)/(1 + lock_strain) (Holmquist, Johnson & Cook 1993)."""
-
-    crush_pressure: float
-    crush_strain: float
-    lock_pressure: float
-    lock_strain: float
-    K1: float
-    K2: float
-    K3: float
-
-
-SolidEos = MieGrueneisen | LinearEos | Compaction
-
-
-@dataclass(frozen=True)
-class NoStrength:
-    """A fluid-like solid: no deviatoric stress."""
-
-
-@dataclass(frozen=True)
-class Elastic:
-    """Hooke's law (A.3)."""
-
-    shear_modulus: float
-
-
-@dataclass(frozen=True)
-class PerfectlyPlastic:
-    """Elastic up to `yield_stress`, then radial return (A.5)."""
-
-    shear_modulus: float
-    yield_stress: float
-
-
-@dataclass(frozen=True)
-class LinearHardening:
-    """Yield stress yield_stress + hardening_modulus * plastic strain."""
-
-    shear_modulus: float
-    yield_stress: float
-    hardening_modulus: float
-
-
-@dataclass(frozen=True)
-class JohnsonCook:
-    """Yield stress (A + B eps^n)(1 + C ln(rate/reference_rate))(1 - T*^m) (A.6); heat capacity in J/(kg K)."""
-
-    shear_modulus: float
-    A: float
-    B: float
-    n: float
-    C: float
-    m: float
-    reference_rate: float
-    room_temperature: float
-    melt_temperature: float
-    heat_capacity: float
-    taylor_quinney: float
-
-
-@dataclass(frozen=True)
-class Concrete:
-    """Holmquist, Johnson & Cook 1993 (A.8-A.11 corrected): yield at compressive_strength times
-    (A (1 - wear) + B p*^N)(1 + C ln(rate/reference_rate)) <= cap; wear by plastic and compacted strain over
-    max(D1 (p* + T*)^D2, least_failure_strain)."""
-
-    shear_modulus: float
-    compressive_strength: float
-    tensile_strength: float
-    A: float
-    B: float
-    N: float
-    C: float
-    cap: float
-    D1: float
-    D2: float
-    least_failure_strain: float
-    reference_rate: float
-
-
-Strength = NoStrength | Elastic | PerfectlyPlastic | LinearHardening | JohnsonCook | Concrete
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Weibull's scatter of the failure strain or stress: a piece of `size` [m] has the given one on average."""
-
-    modulus: float
-    size: float
-    seed: int
-
-
-@dataclass(frozen=True)
-class JohnsonCookFailure:
-    """Fracture strain (D1 + D2 exp(D3 eta))(1 + D4 ln(rate/reference_rate))(1 + D5 T*), and spall at a principal
-    stress; a crack takes fracture_energy [J/m2]."""
-
-    D1: float
-    D2: float
-    D3: float
-    D4: float
-    D5: float
-    reference_rate: float
-    spall_strength: float | None
-    fracture_energy: float
-    scatter: Scatter | None
-
-
-@dataclass(frozen=True)
-class PrincipalStress:
-    """A crack opens where the largest principal stress reaches tensile_strength; it takes fracture_energy [J/m2]."""
-
-    tensile_strength: float
-    fracture_energy: float
-    scatter: Scatter | None
-
-
-Failure = JohnsonCookFailure | PrincipalStress
 
 
 @dataclass(frozen=True)

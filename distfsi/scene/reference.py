@@ -7,6 +7,8 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.laws.registry import laws_of
 from distfsi.scene.loader import schema
 
 Json = Mapping[str, Any]
@@ -28,26 +30,25 @@ An input is a TOML file with `[domain]`, `[time]`, and `[fluid]`, `[solid]` or b
 Keys without a default are needed.
 """
 
+
+def _names(kind: type[Law]) -> tuple[str, ...]:
+    """Of the tables of a kind of laws."""
+    return tuple(law.__name__ for law in laws_of(kind))
+
+
 SECTIONS = {
     "Top level": ("Input",),
     "`[domain]`": ("DomainInput",),
     "`[time]`": ("TimeInput",),
     "`[fluid]`": ("FluidInput",),
-    "`[fluid.phases.NAME]`": ("IdealGas", "StiffenedGas", "Jwl"),
+    "`[fluid.phases.NAME]`": _names(FluidEos),
     "`[[fluid.regions]]`": ("RegionInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
-    "`eos` of a body": ("MieGrueneisen", "LinearEos", "Compaction"),
-    "`strength` of a body": (
-        "NoStrength",
-        "Elastic",
-        "PerfectlyPlastic",
-        "LinearHardening",
-        "JohnsonCook",
-        "Concrete",
-    ),
-    "`failure` of a body": ("JohnsonCookFailure", "PrincipalStress", "Scatter"),
+    "`eos` of a body": _names(SolidEos),
+    "`strength` of a body": _names(Strength),
+    "`failure` of a body": (*_names(Failure), "Scatter"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),

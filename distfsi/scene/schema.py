@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.mirrors import Failure, PhaseInput, Shape, SolidEos, Strength
+from distfsi.scene.law_tables import FailureInput, PhaseInput, SolidEosInput, StrengthInput
+from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
     Acceleration,
     Count,
@@ -131,9 +132,9 @@ class BodyInput(Table):
     spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
     density: Density = Field(description="density at rest")
     velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
-    eos: SolidEos = Field(description="pressure law")
-    strength: Strength = Field(description='strength model, or "none"')
-    failure: Failure | None = Field(None, description="what breaks it; default nothing")
+    eos: SolidEosInput = Field(description="pressure law")
+    strength: StrengthInput = Field(description='strength model, or "none"')
+    failure: FailureInput | None = Field(None, description="what breaks it; default nothing")
     fixed: Shape | None = Field(None, description="particles that start in here keep fixed_velocity")
     fixed_velocity: Velocity | None = Field(None, description="velocity of the fixed particles; default at rest")
     radial_velocity: quantity("m/s") = Field(

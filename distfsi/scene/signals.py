@@ -10,17 +10,11 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.scene.description import (
-    Body,
-    Compaction,
-    Domain,
-    Fluid,
-    FluidState,
-    LinearEos,
-    MieGrueneisen,
-    NoStrength,
-    Scene,
-)
+from distfsi.laws.solid.eos.compaction import Compaction
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
 

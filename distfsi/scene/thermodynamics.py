@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from math import exp
 
-from distfsi.scene.description import FluidEos, IdealGas, Jwl, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
 
 
 def grueneisen(eos: FluidEos) -> float:

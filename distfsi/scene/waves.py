@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-from distfsi.scene.description import FluidEos
+from distfsi.laws.law import FluidEos
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
 
 ISENTROPE_STEPS = 100

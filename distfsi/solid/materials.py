@@ -17,25 +17,20 @@ from scipy.optimize import brentq
 
 from distfsi.device.emit import plain
 from distfsi.device.interface import Columns
-from distfsi.scene.description import (
-    Body,
-    Compaction,
-    Concrete,
-    Elastic,
-    Failure,
-    JohnsonCook,
-    JohnsonCookFailure,
-    LinearEos,
-    LinearHardening,
-    MieGrueneisen,
-    NoStrength,
-    PerfectlyPlastic,
-    PrincipalStress,
-    Scatter,
-    Solid,
-    SolidEos,
-    Strength,
-)
+from distfsi.laws.law import Failure, SolidEos, Strength
+from distfsi.laws.solid.eos.compaction import Compaction
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.failure.principal_stress import PrincipalStress
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.concrete import Concrete
+from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
+from distfsi.laws.solid.strength.linear_hardening import LinearHardening
+from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
+from distfsi.scene.description import Body, Solid
 from distfsi.solid.formulas.concrete import dense_pressure
 from distfsi.solid.formulas.smoothing import smoothing_slope
 

@@ -19,7 +19,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.optimize.elementwise import find_root
 
-from distfsi.scene.description import FluidEos, IdealGas, Jwl, MieGrueneisen, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 
 Array = NDArray[np.float64]
 

@@ -17,23 +17,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
+from distfsi.laws.law import Failure
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
+from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, draw_charts
-from distfsi.scene.description import (
-    Body,
-    Domain,
-    Failure,
-    JohnsonCookFailure,
-    LinearEos,
-    Output,
-    PerfectlyPlastic,
-    Performance,
-    Scatter,
-    Scene,
-    Solid,
-    Time,
-    Tube,
-)
+from distfsi.scene.description import Body, Domain, Output, Performance, Scene, Solid, Time, Tube
 from distfsi.simulation import Simulation
 
 DIRECTORY = Path("out/study_fragments")

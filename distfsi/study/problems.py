@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
-from distfsi.scene.description import Box, HalfSpace, Performance, Scene, Shape, StiffenedGas
+from distfsi.scene.description import Box, HalfSpace, Performance, Scene, Shape
 from distfsi.simulation import Simulation
 from distfsi.study.exact import PureState, exact_riemann
 from distfsi.study.radial import Rings, cylindrical_explosion

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from distfsi.scene.description import StiffenedGas
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.study.exact import PureState
 
 Array = NDArray[np.float64]

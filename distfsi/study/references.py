@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from distfsi.scene.description import FluidEos, IdealGas, Jwl, MieGrueneisen, StiffenedGas
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.jwl import Jwl
+from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.study.exact import PureState
 
 AIR = IdealGas(gamma=1.4)

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.errors import Diverged
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import (
     Ball,
@@ -22,8 +24,6 @@ from distfsi.scene.description import (
     Domain,
     Fluid,
     FluidState,
-    LinearEos,
-    NoStrength,
     Output,
     Performance,
     Phase,

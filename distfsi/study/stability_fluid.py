@@ -19,10 +19,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.law import FluidEos
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.verdicts import VerdictMap, draw_verdicts
 from distfsi.scene import load
-from distfsi.scene.description import FluidEos, FluidState, HalfSpace, IdealGas, Phase, Region, Scene
+from distfsi.scene.description import FluidState, HalfSpace, Phase, Region, Scene
 from distfsi.simulation import Simulation
 from distfsi.study.choices import Method, name_of, settings, varied_alone
 from distfsi.study.exact import RIGHTWARD, Material, PureState, exact_riemann, wave_into

@@ -16,19 +16,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from distfsi.errors import Diverged
+from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
+from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.mesh.communicator import Communicator
-from distfsi.scene.description import (
-    Body,
-    Box,
-    Domain,
-    JohnsonCook,
-    MieGrueneisen,
-    Output,
-    Performance,
-    Scene,
-    Solid,
-    Time,
-)
+from distfsi.scene.description import Body, Box, Domain, Output, Performance, Scene, Solid, Time
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
 from distfsi.study.stability import Map, Stability, corners

@@ -15,9 +15,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
+from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
+from distfsi.laws.solid.scatter import Scatter
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
-from distfsi.scene.description import JohnsonCookFailure, Scatter, Solid
+from distfsi.scene.description import Solid
 from distfsi.simulation import Simulation
 from distfsi.study.references import STEEL_TUBE
 from distfsi.study.steel_tube import INPUT

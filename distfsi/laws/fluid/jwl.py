@@ -1,28 +1,33 @@
 """Jones-Wilkins-Lee products of detonation (paper, Eq. 13, with v = rho0/rho)."""
 
+from dataclasses import dataclass
 from math import exp
 
-from distfsi.formulas.symbols import Symbol
-
-RHO0 = Symbol("density of the undetonated explosive [kg/m3]")
-A = Symbol("[Pa]")
-B = Symbol("[Pa]")
-R1 = Symbol("")
-R2 = Symbol("")
-OMEGA = Symbol("Grueneisen coefficient w")
+from distfsi.laws.law import FluidEos, number, quantity
 
 
-def reference(rho):
-    """Reference pressure [Pa] and its slope with density [m2/s2].
+@dataclass(frozen=True)
+class Jwl(FluidEos):
+    """Products of an explosive: p = A(1 - w/(R1 v)) exp(-R1 v) + B(1 - w/(R2 v)) exp(-R2 v) + w rho e, v = rho0/rho."""
 
-    With x = 1/v = rho/rho0: p = A (1 - w x/R1) exp(-R1/x) + B (1 - w x/R2) exp(-R2/x).
-    """
-    x = rho * (1.0 / RHO0)
-    v = 1.0 / x
-    a = A * exp(-R1 * v)
-    b = B * exp(-R2 * v)
-    pressure = a * (1.0 - OMEGA / R1 * x) + b * (1.0 - OMEGA / R2 * x)
-    # d exp(-R v)/dx = R v^2 exp(-R v)
-    slope_a = a * (R1 * v * v - OMEGA * v - OMEGA / R1)
-    slope_b = b * (R2 * v * v - OMEGA * v - OMEGA / R2)
-    return (pressure, (slope_a + slope_b) * (1.0 / RHO0))
+    rho0: float = quantity("kg/m3", "density of the explosive", above=0.0)
+    A: float = quantity("Pa", "first coefficient")
+    B: float = quantity("Pa", "second coefficient")
+    R1: float = number("first exponent", above=0.0)
+    R2: float = number("second exponent", above=0.0)
+    omega: float = number("Grueneisen coefficient w", above=0.0)
+
+    def reference(self, rho):
+        """Reference pressure [Pa] and its slope with density [m2/s2].
+
+        With x = 1/v = rho/rho0: p = A (1 - w x/R1) exp(-R1/x) + B (1 - w x/R2) exp(-R2/x).
+        """
+        x = rho * (1.0 / self.rho0)
+        v = 1.0 / x
+        a = self.A * exp(-self.R1 * v)
+        b = self.B * exp(-self.R2 * v)
+        pressure = a * (1.0 - self.omega / self.R1 * x) + b * (1.0 - self.omega / self.R2 * x)
+        # d exp(-R v)/dx = R v^2 exp(-R v)
+        slope_a = a * (self.R1 * v * v - self.omega * v - self.omega / self.R1)
+        slope_b = b * (self.R2 * v * v - self.omega * v - self.omega / self.R2)
+        return (pressure, (slope_a + slope_b) * (1.0 / self.rho0))

@@ -1,21 +1,28 @@
-"""Stiffened gas p = (gamma - 1) rho e - gamma p_inf (paper, Eq. 14 corrected); p_inf = 0 is the ideal gas (Eq. 12)."""
+"""The stiffened gas (paper, Eq. 14 corrected)."""
+
+from dataclasses import dataclass
 
 from distfsi.formulas.symbols import Symbol
+from distfsi.laws.law import FluidEos, number, quantity
 
-GAMMA = Symbol("ratio of specific heats")
-P_INF = Symbol("stiffness pressure [Pa]")
 REST_DENSITY = Symbol("density at which the shifted energy vanishes with the pressure [kg/m3]")
 
 
-def reference(rho):
-    """Reference pressure [Pa] and its slope with density."""
-    return (-GAMMA * P_INF, 0.0)
+@dataclass(frozen=True)
+class StiffenedGas(FluidEos):
+    """p = (gamma - 1) rho e - gamma p_inf."""
 
+    gamma: float = number("exponent", above=1.0)
+    p_inf: float = quantity("Pa", "stiffening pressure", at_least=0.0)
 
-def shifted_reference(rho):
-    """The reference to energies counted from that at REST_DENSITY without pressure, a constant per mass.
+    def reference(self, rho):
+        """Reference pressure [Pa] and its slope with density [m2/s2]."""
+        return (-self.gamma * self.p_inf, 0.0)
 
-    For water at 1 bar the energy itself is 7764 times the pressure over gamma - 1: too much for seven digits.
-    """
-    rise = GAMMA * P_INF / REST_DENSITY
-    return (rise * (rho - REST_DENSITY), rise)
+    def shifted_reference(self, rho):
+        """The reference to energies counted from that at REST_DENSITY without pressure, a constant per mass.
+
+        For water at 1 bar the energy itself is 7764 times the pressure over gamma - 1: too much for seven digits.
+        """
+        rise = self.gamma * self.p_inf / REST_DENSITY
+        return (rise * (rho - REST_DENSITY), rise)

@@ -1,0 +1,28 @@
+"""All laws of a kind, found by their files."""
+
+from __future__ import annotations
+
+import pkgutil
+from dataclasses import fields
+from functools import cache
+from importlib import import_module
+
+from distfsi.laws.law import Law
+
+
+def word_of(law: type[Law]) -> str:
+    """The word that chooses a law in the input: the name of its file."""
+    return law.__module__.rpartition(".")[2]
+
+
+@cache
+def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
+    """The laws in the folder of a kind, those with the fewest fields first."""
+    package = import_module(f"distfsi.laws.{kind.folder.replace('/', '.')}")
+    modules = [import_module(f"{package.__name__}.{each.name}") for each in pkgutil.iter_modules(package.__path__)]
+    found = [law for module in modules for law in vars(module).values() if _is_law_of(law, kind, module.__name__)]
+    return tuple(sorted(found, key=lambda law: (len(fields(law)), word_of(law))))
+
+
+def _is_law_of(value: object, kind: type[Law], module: str) -> bool:
+    return isinstance(value, type) and issubclass(value, kind) and value.__module__ == module

@@ -1,0 +1,10 @@
+"""A solid that flows like a fluid."""
+
+from dataclasses import dataclass
+
+from distfsi.laws.law import Strength
+
+
+@dataclass(frozen=True)
+class NoStrength(Strength):
+    """No deviatoric stress."""

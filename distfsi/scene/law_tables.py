@@ -1,0 +1,69 @@
+"""Tables of the input for the laws of materials, made from the fields of their dataclasses."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from types import NoneType
+from typing import Annotated, Any, Literal, Union, get_args, get_type_hints
+
+from pydantic import BeforeValidator, Field, create_model, model_validator
+
+from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.laws.registry import laws_of, word_of
+from distfsi.scene.values import Mirror, quantity
+
+LIMITS = {"above": "gt", "at_least": "ge", "below": "lt", "at_most": "le"}  # pydantic's words
+
+
+class LawTable(Mirror):
+    """A table that gives the numbers of a law."""
+
+    @model_validator(mode="after")
+    def _checked(self) -> LawTable:
+        self.build().check()
+        return self
+
+
+def table_of(law: type[Law], key: str | None = None, word: str | None = None) -> type[LawTable]:
+    """The table of a law; where there are several `key` = `word` chooses this one."""
+    types = get_type_hints(law)
+    chosen = {key: (Literal[word], ...)} if key else {}
+    entries = {each.name: _field(types[each.name], each.metadata["entry"]) for each in fields(law)}
+    summary = law.__doc__.partition("\n\n")[0]
+    table = create_model(law.__name__, __base__=LawTable, __doc__=summary, __module__=__name__, **chosen, **entries)
+    table.describes, table.word = law, key
+    return table
+
+
+def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
+    """Type and description of one key."""
+    options = set(get_args(type_)) - {NoneType} or {type_}
+    (kind,) = options
+    limits = {LIMITS[name]: limit for name, limit in given.limits.items()}
+    if is_dataclass(kind):
+        found = table_of(kind)
+    elif given.unit is not None:
+        found = quantity(given.unit, **limits)
+    else:
+        found = Annotated[kind, Field(strict=True, **limits)]
+    default = ... if given.default is NEEDED else given.default
+    return (found | None if kind is not type_ else found), Field(default, description=given.meaning)
+
+
+def choice(kind: type[Law], key: str = "kind") -> Any:
+    """The type of a table for any law of a kind, whose word stands behind `key`."""
+    tables = tuple(table_of(law, key, word_of(law)) for law in laws_of(kind))
+    return Annotated[Union[tables], Field(discriminator=key)] if len(tables) > 1 else tables[0]  # noqa: UP007
+
+
+def _word_as_table(value: Any) -> Any:
+    return {"kind": value} if isinstance(value, str) else value
+
+
+PhaseInput = choice(FluidEos, "eos")
+SolidEosInput = choice(SolidEos)
+FailureInput = choice(Failure)
+_StrengthTable = choice(Strength)
+StrengthInput = Annotated[
+    _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])
+]
