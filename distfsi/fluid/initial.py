@@ -6,7 +6,7 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.mesh.blocks import Blocks
 from distfsi.scene.description import Fluid, FluidState
 from distfsi.scene.shapes import cell_fractions, contains

@@ -76,7 +76,7 @@ def fluid_model(scene: Scene) -> FluidModel:
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
-    curved = reconstructed is reconstruction.weno5
+    asymmetric = reconstructed is reconstruction.weno5
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
@@ -85,20 +85,21 @@ def fluid_model(scene: Scene) -> FluidModel:
         "GRAVITY": scene.gravity,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
-        "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
+        "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
-        "SHARPENED": phases == 2 and (fluid.sharpening or curved),
-        "CURVED": curved,
-        "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
+        "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
+        "ASYMMETRIC": asymmetric,
+        "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
-    if constants["FINISHES"]:
+    if constants["BISECTION_FALLBACK"]:
         bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
         bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
-    bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
+    positive = ("limiter_indicator", "is_admissible", "limited_flux")
+    bindings |= {name: Bound(getattr(positivity, name)) for name in positive}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
     bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(

@@ -8,7 +8,7 @@ from distfsi.coupling.kernels.cells import COVERED, DEEP, FLUID, FRESH, UNKNOWN,
 from distfsi.coupling.kernels.faces import BOX, flux_of_face, look_at_face
 from distfsi.coupling.kernels.interpolation import any_particle, sum_particles
 from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.fluid.kernels.stage import place
+from distfsi.fluid.kernels.records import position_of
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
 from distfsi.solid.kernels.pairs import DENSITY, MASS, VELOCITY
@@ -202,7 +202,7 @@ def add_flux(passed, n, U, at, cells, steps, rates, axis, weight, P, T, F):
     look_at_face(U, at, cells, steps, axis, P, T)
     flux_of_face(P, T, F, rates, axis)
     for v in range(PHASES + DIMENSIONS + 1):
-        passed[n, v] += weight * load(F, 2 * place(v, axis))
+        passed[n, v] += weight * load(F, 2 * position_of(v, axis))
 
 
 @driver

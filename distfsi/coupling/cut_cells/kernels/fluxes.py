@@ -9,9 +9,10 @@ from distfsi.coupling.formulas.moving_wall import normal_of, stage_content, wall
 from distfsi.coupling.kernels.cells import FLUID
 from distfsi.coupling.kernels.faces import BOX, LINE, flux_of_face, look_at_face
 from distfsi.device.markers import driver, helper, load, real, row, store, workspace
-from distfsi.fluid.kernels.stage import face_fluxes, place, primitives_row, rises_row
+from distfsi.fluid.kernels.records import Faces, position_of
+from distfsi.fluid.kernels.rows import face_fluxes, increments_row, primitives_row
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FLUXES, LANES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
+from distfsi.formulas.symbols import DIMENSIONS, FLUXES, LANES, PHASES, TRANSVERSE_SENSOR, VARIABLES, primitives
 from distfsi.formulas.tensors import dot
 
 STOPS_LOW, STOPS_HIGH = 1, 2
@@ -26,8 +27,8 @@ def open_between(kind, old, new, at, axis, step, cells):
 
 @helper
 def see_wall(kind, old, new, at, cells, step, axis, T):
-    """Set rises T around the face between a cell and the next along `axis` to 0 where one of the cells that make them
-    is covered or behind a closed face; returns the open part of the face."""
+    """Set increments T around the face between a cell and the next along `axis` to 0 where one of the cells that make
+    them is covered or behind a closed face; returns the open part of the face."""
     between = open_between(kind, old, new, at + step, axis, step, cells)
     for c in range(2):
         beyond = open_between(kind, old, new, at + 2 * c * step, axis, step, cells)
@@ -78,7 +79,7 @@ def look_at_faces(U, Q, P, at, lane, cells, steps, axis):
     for v in range(VARIABLES):
         for c in range(4):
             store(Q, (v * BOX + LINE + c) * LANES + lane, load(U, first + v * cells + (c - 1) * step))
-        if LOOKS_SIDEWAYS:
+        if TRANSVERSE_SENSOR:
             for d in range(1, DIMENSIONS):
                 beside = steps[(axis + d) % DIMENSIONS]
                 for c in range(1, 3):
@@ -91,7 +92,7 @@ def look_at_faces(U, Q, P, at, lane, cells, steps, axis):
 def primitives_of_faces(Q, P):
     """P = primitives of the states Q around LANES faces."""
     primitives_row(Q, P, LINE * LANES, BOX * LANES, LINE * LANES, BOX * LANES, 4 * LANES)
-    if LOOKS_SIDEWAYS:
+    if TRANSVERSE_SENSOR:
         for line in range(1 - DIMENSIONS, DIMENSIONS):
             if line != 0:
                 first = (LINE + 4 * line + 1) * LANES
@@ -124,7 +125,7 @@ def find_fluxes(begin, end, band, faces, seen, flux, U, shape, steps, rates):
                 look_at_faces(U, Q, P, at, i, cells, steps, axis)
             primitives_of_faces(Q, P)
             c = (LINE + 1) * LANES
-            rises_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
+            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
             for i in range(n):
                 stops = seen[faces[first + i]] - 1
                 for v in range(VARIABLES):
@@ -133,14 +134,25 @@ def find_fluxes(begin, end, band, faces, seen, flux, U, shape, steps, rates):
                     if stops >= STOPS_HIGH:
                         store(T, (2 * v + 1) * LANES + i, 0.0)
             rate = real(2 * DIMENSIONS) * rates[axis]
-            face_fluxes(
-                P, T, F, c, BOX * LANES, LANES, 4 * LANES, 8 * LANES, 0, LANES, 2 * LANES, 0, axis, rate, LANES, LANES
+            faces_of_box = Faces(
+                cell=c,
+                variables=BOX * LANES,
+                across=LANES,
+                beside_1=4 * LANES,
+                beside_2=8 * LANES,
+                low=0,
+                high=LANES,
+                flux=0,
+                rows=2 * LANES,
+                axis=axis,
+                rate=rate,
             )
+            face_fluxes(P, T, F, faces_of_box, LANES, LANES)
             for i in range(n):
                 face = faces[first + i]
                 m, to = face % per_axis // 2, (2 * axis + face % 2) * FLUXES
                 for v in range(FLUXES):
-                    flux[m, to + v] = load(F, 2 * place(v, axis) * LANES + i)
+                    flux[m, to + v] = load(F, 2 * position_of(v, axis) * LANES + i)
             first += n
 
 
@@ -259,4 +271,4 @@ def book_sides(
             if weight != 0.0:
                 flux_of_face(P, T, F, rates, axis)
                 for v in range(PHASES + DIMENSIONS + 1):
-                    passed[n, v] += weight * load(F, 2 * place(v, axis))
+                    passed[n, v] += weight * load(F, 2 * position_of(v, axis))

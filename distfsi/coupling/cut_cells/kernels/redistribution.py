@@ -10,9 +10,9 @@ from distfsi.coupling.formulas.moving_wall import state_before_relaxation, state
 from distfsi.coupling.kernels.cells import FLUID
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.fluid.formulas.relaxation import halved_range, range_of_change
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FINISHES, LANES, PHASES, VARIABLES, bulk_modulus, primitives
+from distfsi.formulas.symbols import BISECTION_FALLBACK, DIMENSIONS, LANES, PHASES, VARIABLES, bulk_modulus, primitives
 
 SWEPT = 3  # fields of `swept` for two phases; one phase has 1
 SEALED = 1e-3  # of a cell: the least volume of fluid that is shut in
@@ -233,7 +233,7 @@ def mix(begin, end, band, joined, mixed, U, swept, fraction, master, offsets, st
         for i in range(lanes):
             for v in range(VARIABLES):
                 mixed[box * LANES + i, v] = load(S, v * LANES + i)
-            if FINISHES:
+            if BISECTION_FALLBACK:
                 if load(S, VARIABLES * LANES + i) < 0.0:
                     mixed[box * LANES + i, VARIABLES - 1] = relaxed_to_the_end(Q, i)
 
