@@ -26,16 +26,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROWS = (fluid.primitives_row, fluid.increments_row, fluid.flux_row, fluid.update_row, signal_row, peaks.peaks_row)
-REALS = (
-    "rx",
-    "ry",
-    "rz",
-    "ambient",
-    "threshold",
-    "time",
-    "faces_rate",
-    *(f"step_{name}" for name in StageStep._fields),
-)
+REALS = {"rx", "ry", "rz", "ambient", "threshold", "time", "dt", "faces_rate"} | {
+    f"step_{name}" for name in StageStep._fields
+}
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),

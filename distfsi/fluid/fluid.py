@@ -183,10 +183,9 @@ class Fluid:
         real = self._buffers[0].dtype.type
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiling.block[~self.rest.settled])
-        self.team.run(
-            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].device,
-            self._first_active(), self._extent, *inverse, self._fastest.device,
-        )  # fmt: skip
+        cells = self._buffers[0].device, self._first_active(), self._extent
+        chosen = self.team.array(changed)
+        self.team.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
         return float(np.max(self._fastest.host()))
 
     @property

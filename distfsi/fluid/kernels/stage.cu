@@ -195,6 +195,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const long long t = chosen[at], *tile = tiles_table + t * tiles_table_1;
     const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
     const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
+
+    // whether all cells that the tile reads hold one state
     const bool is_calm = tiles_calm[t];
     bool uniform = is_calm;
     if (!is_calm) {
@@ -203,6 +205,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                             || is_unlike(states_before + u0, states_before + u0, nx, ny, nz, tx, ty, sy, sz, su);
         uniform = __syncthreads_count(unlike) == 0;
     }
+
+    // what is computed of it, and what it stands for
     const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
     const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
     const bool inside = tx < n && ty < m;
@@ -213,6 +217,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
+    // primitives of the first planes, and fluxes through the low side along z
     for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, states_now + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
@@ -227,6 +232,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     }
     for (int k = 0; k < l; k++) {
         if constexpr (DIMENSIONS > 2) load_plane(numbers, states_now + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
+        // fluxes along x, and the first part of the divergence
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
                 count += flux<0>(numbers, P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
@@ -242,6 +248,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             if (sides & 1) account(out, F + j * ROW, 0, step, 1, x_alike, step_weight * step_x);
             if (sides & 2) account(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, step_weight * step_x);
         }
+        // fluxes along y
         if constexpr (DIMENSIONS > 1) {
             __syncthreads();
             if (tx < n)
@@ -258,6 +265,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             if (sides & 4) account(out + 2 * CONSERVED, F, 1, step, nx, y_alike, step_weight * step_y);
             if (sides & 8) account(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, step_weight * step_y);
         }
+        // fluxes through the high side along z, which are those of the next plane's low side
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
                 count += flux<2>(numbers, P, tx, ty, k, rz, high, APART) && k < l - 1;
@@ -275,6 +283,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                 for (int j = 0; j < m; j++) account(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, step_weight * step_z);
             }
         }
+        // the new state
         if (inside) {
             const long long u = u0 + k * sz + ty * sy + tx;
             real before[VARIABLES], now[VARIABLES];
@@ -292,6 +301,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         }
         __syncthreads();
     }
+    // whether the tile has stayed as it is; a uniform one gets its state everywhere
     bool unchanged = uniform;
     for (int v = 0; v < VARIABLES && uniform; v++) {
         const real value = states_after[u0 + v * su];
@@ -300,6 +310,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             for (int j = ty; j < ny; j += TILE_Y)
                 for (int i = tx; i < nx; i += TILE_X) states_after[u0 + v * su + k * sz + j * sy + i] = value;
     }
+    // how many faces were limited
     long long *counts = (long long *)shared;
     counts[threadIdx.x] = count;
     __syncthreads();

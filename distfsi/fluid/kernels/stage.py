@@ -203,9 +203,20 @@ def advance_tile(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stage
 
 
 STAGE_FORMULAS = (
-    "primitives", "reconstructed", "sharpened", "face_flux", "sound_speed", "limiter_indicator", "is_admissible",
-    "limited_flux", "updated", "before_relaxation", "range_of_change", "halved_range", "fraction_after",
-)  # fmt: skip
+    "primitives",
+    "reconstructed",
+    "sharpened",
+    "face_flux",
+    "sound_speed",
+    "limiter_indicator",
+    "is_admissible",
+    "limited_flux",
+    "updated",
+    "before_relaxation",
+    "range_of_change",
+    "halved_range",
+    "fraction_after",
+)
 
 
 def stage_block(constants, arguments):
