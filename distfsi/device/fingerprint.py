@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from types import CodeType
 
-from distfsi.device.fold import Bound, Source, fields_of
+from distfsi.device.fold import Bound, Source, fields_of, is_record
 
 WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone
 
@@ -46,6 +46,8 @@ def fingerprint(driver: Callable, constants: Mapping[str, object], bindings: Map
             for callee in [value, *formulas]:
                 if hasattr(callee, "__code__"):
                     tell(callee, scope, owner)
+            if is_record(value):
+                told.update(repr(fields_of(value)).encode())
             if isinstance(value, (bool, int, float, tuple)):
                 told.update(f"{name} = {value!r}".encode())
 
