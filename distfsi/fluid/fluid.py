@@ -13,11 +13,14 @@ from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageStep, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
+from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
 from distfsi.fluid.tiles import Tiling
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels.regions import copy_regions
+from distfsi.narrowing import present
+from distfsi.scene.description import Fluid as FluidOfScene
 from distfsi.scene.description import Scene
 
 
@@ -47,23 +50,25 @@ class Fluid:
     step. stages: those that make a step.
     """
 
-    def __init__(self, scene: Scene, model, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
         self.model, self.blocks, self.team = model, blocks, team
         self.stages = SCHEMES[scene.time.scheme]
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
-        real = scene.fluid.precision
+        given = present(scene.fluid)
+        real = given.precision
         self.kernels = team.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
-        initial = InitialState(scene.fluid, model)
-        self.inflow = self._inflow_states(scene, initial)
+        initial = InitialState(given, model)
+        self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
-            buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
+            buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
         self._buffers = [DualArray(team, buffer) for buffer in buffers]
         self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
+        self._stages, self._calm = team.array(self.rest.stages), team.array(self.rest.calm)
         self._extent = team.array(blocks.extent)
         self._fastest = DualArray(team, np.zeros(blocks.local_count))
         self._before = self._accounted()
@@ -71,9 +76,9 @@ class Fluid:
         self.volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
-    def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
+    def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
-        for axis, sides in enumerate(scene.fluid.inflow):
+        for axis, sides in enumerate(given.inflow):
             for side, state in enumerate(sides):
                 if state is not None:
                     states[axis, side] = initial.of(state)
@@ -162,7 +167,7 @@ class Fluid:
         chosen = self.team.array(tiles)
         self.team.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
 
-    def rates(self, dt: float) -> list:
+    def rates(self, dt: float) -> list[Any]:
         """dt/h [s/m] along each of three axes, in the fluid's precision."""
         real = self._buffers[0].dtype.type
         return [real(dt / h) for h in self.blocks.grid.spacing]
@@ -193,7 +198,7 @@ class Fluid:
         """(local blocks,) the last fastest signal [1/s] of each block."""
         return self._fastest.host()
 
-    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple, str]:
+    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple[int, ...], str]:
         """The fastest of `signals`, those of this rank's blocks before the last step, where its block begins in the
         grid, and its cell in words. Of equal ones that whose block comes last along z, y, x."""
         if not self.blocks.local_count:
@@ -211,7 +216,7 @@ class Fluid:
         text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({position}) m"
         return float(signals[block]), tuple(self.blocks.origin[block, ::-1].tolist()), text
 
-    def _position(self, block: int, cell: tuple) -> str:
+    def _position(self, block: int, cell: tuple[Any, ...]) -> str:
         """The center of the cell (z, y, x) of a local block, in words."""
         centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
         return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
@@ -353,7 +358,7 @@ class Fluid:
         """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""
         return field[(block, *self._inside(block))]
 
-    def _inside(self, block: int) -> tuple:
+    def _inside(self, block: int) -> tuple[Any, ...]:
         """Where the active cells of a local block are in what is stored of it."""
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
         return (..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))

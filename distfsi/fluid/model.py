@@ -5,7 +5,9 @@ A new equation of state is one file in laws/fluid/.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.law import FluidEos
+from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, Scene
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
@@ -22,7 +25,9 @@ RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost l
     "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
     "weno5": (reconstruction.weno5, limiters.van_leer, 3),
 }
-RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
+RIEMANN_SOLVERS: dict[
+    str, tuple[Callable[..., Any], ...]
+] = {  # bounding speeds, diffusion across contacts, viscosity along faces
     "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
     "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
@@ -33,10 +38,7 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 @dataclass(frozen=True)
 class FluidModel:
-    """Everything the fluid's kernels are specialised with, and the meaning of its variables.
-
-    mirror: per variable the axis whose reflection changes its sign, -1 for none.
-    """
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables."""
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
@@ -45,11 +47,13 @@ class FluidModel:
 
     @property
     def phases(self) -> int:
+        """How many materials there are."""
         return len(self.eos)
 
     @property
     def variables(self) -> int:
-        return self.constants["VARIABLES"]
+        """Stored fields per cell."""
+        return of_kind(int, self.constants["VARIABLES"])
 
     @property
     def conserved(self) -> int:
@@ -58,11 +62,12 @@ class FluidModel:
 
     @property
     def mirror(self) -> np.ndarray:
+        """(variables,) the axis whose reflection changes the sign of each, -1 for none."""
         axes = np.full(self.variables, -1, dtype=np.int64)
         axes[self.phases : self.phases + self.dimensions] = np.arange(self.dimensions)
         return axes
 
-    def formula(self, name: str):
+    def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
         bound = self.bindings[name]
         return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
@@ -70,7 +75,7 @@ class FluidModel:
 
 def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
-    fluid: Fluid = scene.fluid
+    fluid = present(scene.fluid)
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
     eos = tuple(phase.eos for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)

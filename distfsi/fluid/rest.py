@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from distfsi.mesh.blocks import Blocks
@@ -26,7 +28,7 @@ class Rest:
     counts  tile stages so far: [at rest, all]
     """
 
-    def __init__(self, blocks: Blocks, first: np.ndarray, size: tuple[int, ...]):
+    def __init__(self, blocks: Blocks, first: np.ndarray, size: Sequence[int]):
         """`first` (tiles, 3): first cell of each tile in the grid; `size` (3,): cells of a whole tile."""
         self.stages = np.zeros(len(first) + 1, dtype=np.int64)
         self.calm = np.zeros(len(first), dtype=bool)
@@ -39,7 +41,7 @@ class Rest:
 
     def end_stage(self) -> None:
         """Count the tiles that have rested."""
-        self.counts += [np.count_nonzero(self.stages), len(self.calm)]
+        self.counts += np.array([np.count_nonzero(self.stages), len(self.calm)])
 
     def wake(self, tiles: np.ndarray | slice = np.s_[:]) -> None:
         """Something else than a stage has written into `tiles` (by default all)."""
@@ -51,7 +53,7 @@ class Rest:
         return self.stages[:-1] >= SETTLED
 
 
-def tile_sources(blocks: Blocks, first: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+def tile_sources(blocks: Blocks, first: np.ndarray, size: Sequence[int]) -> np.ndarray:
     """Numbers (tiles, k) of the tiles from which the cells and ghosts of each tile come; -1 for what is not a tile of
     this rank. Arguments as for Rest."""
     positions, sources = zip(*(_along(blocks, axis, first[:, axis], size[axis]) for axis in range(3)), strict=True)
