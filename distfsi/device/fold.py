@@ -618,6 +618,8 @@ class Fold(ast.NodeTransformer):
             if self.flat_parameters(*self.record_of(node.func.value)):
                 node.args.insert(0, node.func.value)
             node.func = ast.Name(ast.unparse(node.func), ast.Load())  # a formula of a law
+        if made := self.made_record(node):
+            return self.visit(ast.copy_location(ast.Tuple(made[1], ast.Load()), node))
         if not isinstance(node.func, ast.Name) or node.keywords:
             raise self.refuse(node, "call functions by their plain names, without keywords")
         name = node.func.id
