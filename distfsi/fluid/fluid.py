@@ -137,15 +137,15 @@ class Fluid:
         """Where a stage leaves its state; asked before the stage."""
         return self._buffers[_output(stage.number)].device
 
-    def set_volumes(self, volumes: DualArray) -> None:
-        """From now on fluid fills cells in part: by the first of the fields (local blocks, fields, Z, Y, X), which who
-        gives them changes between stages. By default all cells are whole."""
-        self._volumes = volumes
-
     def average_sources(self, start: float, dt: float) -> None:
         """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
         if self.model.body_force.average_over(start, dt):
             self.rest.wake()
+
+    def set_volumes(self, volumes: DualArray) -> None:
+        """From now on fluid fills cells in part: by the first of the fields (local blocks, fields, Z, Y, X), which who
+        gives them changes between stages. By default all cells are whole."""
+        self._volumes = volumes
 
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
