@@ -46,7 +46,7 @@ TAKEN = frozenset(  # words of C++ and of device/runtime.h
     float friend goto inline int integer item length long mutable namespace new not operator or pack private protected
     public real register requires short signed sizeof static struct switch template this throw true try typedef typename
     union unsigned using virtual void volatile xor load store""".split()  # noqa: SIM905
-)
+) | {*WORDS.values()}
 
 
 @cache
