@@ -16,7 +16,7 @@ from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
-from distfsi.diagnostics.gauges import Gauge, gauge_of
+from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks, schlieren
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid
@@ -56,7 +56,7 @@ class Simulation:
     solid: Solid | None
     coupling: Coupling | None
     timers: Timers
-    watchers: list[Peaks | Gauge] = field(default_factory=list)
+    watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
@@ -88,7 +88,7 @@ class Simulation:
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(team))
         if scene.output.peaks:
             simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
-        simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
+        simulation.watchers += [GaugeRecorder(name, gauge, simulation) for name, gauge in scene.gauges.items()]
         return simulation
 
     @property

@@ -270,16 +270,16 @@ def without_wait_of_get(gpu):
 
 MUTANTS = {
     "the wait before messages": without("finish_asynchronous"),
-    "the copy of what is sent": without("take"),
-    "the copy of what came": without("put"),
+    "the copy of what is sent": without("download_to"),
+    "the copy of what came": without("upload"),
     "the wait for the ghosts": without_order(Queue.MAIN),
     "the wait for the cells": without_order(Queue.ASYNCHRONOUS),
     "the wait before looking": without_wait_of_get,
 }
 SOLID_MUTANTS = {
     "the wait before messages": without("finish_asynchronous"),
-    "the copy of what is sent": without("take"),
-    "the copy of what came": without("put"),
+    "the copy of what is sent": without("download_to"),
+    "the copy of what came": without("upload"),
     "the wait for the ghosts": without_order(Queue.MAIN),
 }
 

@@ -1,13 +1,14 @@
-"""Tables of the input for the laws of materials, made from the fields of their dataclasses."""
+"""Tables of the input for laws and gauges, made from the fields of their dataclasses."""
 
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from types import NoneType
-from typing import Annotated, Any, Literal, Union, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from distfsi.gauges import Gauge
 from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
 from distfsi.scene.values import Mirror, quantity, vector
@@ -37,7 +38,8 @@ def table_of(law: type[Law], key: str | None = None, word: str | None = None) ->
 
 def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
     """Type and description of one key."""
-    (kind,) = {type_} if given.vector else set(get_args(type_)) - {NoneType} or {type_}
+    whole = given.vector or get_origin(type_) is Literal
+    (kind,) = {type_} if whole else set(get_args(type_)) - {NoneType} or {type_}
     limits = {LIMITS[name]: limit for name, limit in given.limits.items()}
     if is_dataclass(kind):
         found = table_of(kind)
@@ -45,10 +47,12 @@ def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
         found = vector(given.unit)
     elif given.unit is not None:
         found = quantity(given.unit, **limits)
+    elif whole:
+        found = kind
     else:
         found = Annotated[kind, Field(strict=True, **limits)]
     default = ... if given.default is NEEDED else given.default
-    return (found | None if kind is not type_ else found), Field(default, description=given.meaning)
+    return (found | None if kind is not type_ else found), Field(default, alias=given.key, description=given.meaning)
 
 
 def choice(kind: type[Law], key: str = "kind") -> Any:
@@ -65,6 +69,7 @@ PhaseInput = choice(FluidEos, "eos")
 SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
 SourceInput = choice(Source)
+GaugeInput = choice(Gauge)
 _StrengthTable = choice(Strength)
 StrengthInput = Annotated[
     _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])
