@@ -164,22 +164,22 @@ def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: Ti
     with timers("solid"):
         made = sub_cycle(solid, coupling, planned)  # Eqs. 5-7
     with timers("geometry"):
-        coupling.update_geometry()
+        geometry = coupling.update_geometry()
     fluid.average_sources(made.start, made.dt)
     for stage in fluid.stages:  # Eq. 16
         with timers("merge"):
-            coupling.merge(stage)
+            cells = coupling.merge(geometry, stage)
         advance_stage(fluid, stage, made.dt, timers)
         with timers("flux"):
-            coupling.apply_wall_fluxes(stage, made.dt)
+            coupling.apply_wall_fluxes(geometry, cells, stage, made.dt)
     with timers("merge"):
-        coupling.redistribute()
+        coupling.redistribute(geometry)
     with timers("forces"):
-        impulse = coupling.transfer_impulse(made.dt)
+        transfer = coupling.transfer_impulse(geometry, cells, made.dt)
     with timers("solid"):
-        excess = solid.apply_impulse(impulse)  # Eq. 34
+        excess = solid.apply_impulse(transfer.impulse)  # Eq. 34
     with timers("forces"):
-        coupling.account_work(excess)
+        coupling.account_work(geometry, transfer, excess)
     with timers("solid"):
         solid.migrate()
     return made

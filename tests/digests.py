@@ -33,6 +33,12 @@ RENAMED: dict[str, str] = {
     "restart/accounts/values/start": "restart/budget/values/start",
     "history.csv/sealed mass_1 [kg]": "history.csv/trapped mass_1 [kg]",
     "history.csv/sealed mass_2 [kg]": "history.csv/trapped mass_2 [kg]",
+    "restart/coupling/cells/swept": "restart/coupling/cells/fluid_volume",
+    "restart/coupling/values/way": "restart/coupling/values/drift",
+    "restart/solid/particles/ball": "restart/solid/particles/inflation",
+    "restart/solid/particles/dust": "restart/solid/particles/lone",
+    "particles/dust": "particles/lone",
+    "gauges/particle.csv/dust": "gauges/particle.csv/lone",
 }
 
 # The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work, and how
@@ -41,7 +47,7 @@ NO_RESULT = ("restart/scene", "balance.csv/", "performance.csv/")
 
 # A particle whose ball has no radius is none. Where it would point is not read, and depends on the particles that are
 # looked at together with it, and so on the number of ranks.
-BALLS = "solid/particles/ball"
+BALLS = "solid/particles/inflation"
 
 Digests = dict[str, str]
 

@@ -52,6 +52,11 @@ def _check_point(law, material, rho, p):
     assert slope == pytest.approx(p_cold / rho**2, rel=1e-5, abs=1e-9)
     assert material.pressure(rho, e_cold) == pytest.approx(p_cold, abs=1e-11 * size)
 
+    beyond = 1.01 * law.maximum_density
+    if np.isfinite(beyond):
+        with np.errstate(invalid="ignore"):
+            assert np.isnan(model.formula("primitives")((beyond, 0.0, beyond * e))[2])
+
     c = material.sound_speed(rho, p)
     assert thermodynamics.sound_speed_squared(law, rho, p) == pytest.approx(c**2, rel=1e-12)
     assert model.formula("sound_speed")((rho, 0.0, p)) == pytest.approx(c, rel=1e-12)

@@ -639,6 +639,27 @@ def walk(begin, end, pair: Pair, out):
 
 
 @helper
+def step_of(i, window: Window):
+    return window.step + i
+
+
+@driver
+def makes_windows(begin, end, start, out):
+    for i in range(begin, end):
+        out[i] = value_at(Window(step=2.0, start=start), i) + step_of(i, Window(start, 0.5))
+
+
+@driver
+def makes_half_a_window(begin, end, start, out):
+    out[0] = value_at(Window(start=start), 0)
+
+
+@driver
+def makes_another_record(begin, end, start, out):
+    out[0] = value_at(Pair(left=start, weight=1.0), 0)
+
+
+@helper
 def float_of(pair: Pair):
     return pair.left.step
 
@@ -683,6 +704,21 @@ def test_records_are_flattened_for_both_writers():
     other = np.zeros(3)
     HostKernel(kernel)(3, kernel.given((pair, other)))
     assert other.tolist() == out.tolist()
+
+
+def test_records_are_made_where_they_are_handed_on():
+    out, start = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    cpu.build([makes_windows], {}).makes_windows(0, 3, start, out)
+    assert out.tolist() == [2.5, 5.5, 8.5]
+
+
+@pytest.mark.parametrize(
+    ("function", "why"),
+    [(makes_half_a_window, "Window has the fields start, step"), (makes_another_record, "window is no Pair")],
+)
+def test_a_record_has_all_fields_and_the_class_of_its_parameter(function, why):
+    with pytest.raises(NotInSubset, match=why):
+        text_of(function)
 
 
 def springs(first, second):

@@ -11,12 +11,22 @@ from distfsi.fluid.fluid import Stage
 from distfsi.mesh.blocks import Snapshot
 
 
+class Transfer(Protocol):
+    """What the fluid gives to a solid in a step."""
+
+    @property
+    def impulse(self) -> Any:
+        """(own, D) [N s] on this rank's particles, an array of the device."""
+
+
 class Coupling(Protocol):
     """Lets fluid and solid act on each other. The order of calls in a step (distfsi/step.py):
 
     time_step(), once the forces between particles are known; when the solid has been advanced update_geometry(); in
     each stage merge() before the fluid's tiles and apply_wall_fluxes() after them; redistribute(), transfer_impulse(),
-    and account_work() when the solid has taken the impulse. All else may be asked for between steps.
+    and account_work() when the solid has taken the impulse. What a call finds it returns, and those that follow take
+    it: the `geometry` of the step, the `cells` of the stage, the `transfer`; what is in them is the coupling's alone,
+    but for `transfer.impulse`. All else may be asked for between steps.
 
     team       the device, whose seconds are those of the coupling alone
     reach      [m]: how far the solid's ghosts and images must go
@@ -37,25 +47,25 @@ class Coupling(Protocol):
     def time_step(self) -> float:
         """Longest step [s] that this rank's particles allow, or sub-step when the wall moves on; inf: any."""
 
-    def update_geometry(self) -> None:
-        """Collective. Find where the wall is now and how it has moved since the step began."""
+    def update_geometry(self) -> Any:
+        """Collective. Where the wall is now and how it has moved since the step began."""
 
-    def merge(self, stage: Stage) -> None:
+    def merge(self, geometry: Any, stage: Stage, /) -> Any:
         """Collective. Make all cells of the stage's input states from which the fluid's stage can go on: small cells
         share with others, covered ones get what their neighbours are to see."""
 
-    def apply_wall_fluxes(self, stage: Stage, dt: float) -> None:
+    def apply_wall_fluxes(self, geometry: Any, cells: Any, stage: Stage, dt: float, /) -> None:
         """Let the wall's fluxes act in a stage, which the fluid has made, of a step of `dt` [s]; keep what has crossed
         the wall."""
 
-    def redistribute(self) -> None:
+    def redistribute(self, geometry: Any, /) -> None:
         """Collective, after the last stage. Make all cells of the new state states again."""
 
-    def transfer_impulse(self, dt: float) -> Any:
-        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step of `dt` [s], an array of
-        the device."""
+    def transfer_impulse(self, geometry: Any, cells: Any, dt: float, /) -> Transfer:
+        """Collective. What the fluid gives to this rank's particles in the step of `dt` [s]; `cells`: of its last
+        stage."""
 
-    def account_work(self, excess: Any) -> None:
+    def account_work(self, geometry: Any, transfer: Any, excess: Any, /) -> None:
         """Collective. Account for what the solid has received, whose impulse worked at the `excess` (own, D) [m/s] over
         the velocity of the wall that the stages knew."""
 

@@ -567,9 +567,26 @@ class Fold(ast.NodeTransformer):
                 if class_ is not record[1]:
                     raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {record[1].__name__}")
                 out += [ast.Name(flat, ast.Load()) for flat in self.flat_parameters(record[0], record[1])]
+            elif made := self.made_record(argument):
+                if class_ is not made[0]:
+                    raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {made[0].__name__}")
+                out += made[1]
             else:  # a tuple that holds the fields
                 out += [ast.Subscript(argument, ast.Constant(k), ast.Load()) for k in range(len(fields_of(class_)))]
         return out
+
+    def made_record(self, node: ast.expr) -> tuple[type, list[ast.expr]] | None:
+        """The class and the fields, in order, of a record that is made where it is handed on."""
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id in self.locals:
+            return None
+        class_ = self.source.function.__globals__.get(node.func.id)
+        if not is_record(class_):
+            return None
+        names = list(fields_of(class_))
+        fields = dict(zip(names, node.args, strict=False)) | {word.arg: word.value for word in node.keywords}
+        if len(node.args) + len(node.keywords) != len(names) or fields.keys() != set(names):
+            raise self.refuse(node, f"{class_.__name__} has the fields {', '.join(names)}")
+        return class_, [fields[name] for name in names]
 
     def visit_Tuple(self, node: ast.Tuple):
         if isinstance(node.ctx, ast.Load):

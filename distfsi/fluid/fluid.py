@@ -65,7 +65,7 @@ class Fluid:
         self._fastest = DualArray(team, np.zeros(blocks.local_count))
         self._before = self._booked()
         self._signal: float | None = None
-        self.volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
+        self._volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
@@ -142,6 +142,11 @@ class Fluid:
         if self.model.body_force.average_over(start, dt):
             self.rest.wake()
 
+    def set_volumes(self, volumes: DualArray) -> None:
+        """From now on fluid fills cells in part: by the first of the fields (local blocks, fields, Z, Y, X), which who
+        gives them changes between stages. By default all cells are whole."""
+        self._volumes = volumes
+
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
         self._before = self._booked()
@@ -195,7 +200,7 @@ class Fluid:
         real = output.dtype.type
         self.team.run(
             self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
-            self._buffers[0].device, self.input_of(stage), output.device, self.volumes.device, self._through.device,
+            self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device, self._through.device,
             self._limited.device, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
         )  # fmt: skip
 

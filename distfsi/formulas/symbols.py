@@ -23,9 +23,11 @@ def chosen(name: str, meaning: str):
 
 
 DIMENSIONS = Symbol("number of space dimensions, 1 to 3")
-LEAST_ALONE = Symbol("open part of a cell with which its fluid stands alone where it finds no neighbour to join")
+MINIMUM_ISOLATED = Symbol(
+    "minimum isolated volume fraction: with more a cell stands alone where it has no merge target"
+)
 LANES = Symbol("how many items of a list a thread of the device computes side by side")
-KICKS = Symbol("values that a cell gives to the particles around it, the velocity first")
+TRANSFERRED = Symbol("transfer components: values that a cell gives to the particles around it, the velocity first")
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 

@@ -86,6 +86,10 @@ class Structure(Protocol):
     def around(self) -> Near:
         """Own points, ghosts and images within the reach of the last prepare()."""
 
+    def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
+        """A column (own, …) of a coupling's own: it goes with the points to other ranks and into restart files, and
+        into field files if it is `shown`."""
+
     def prepare(self, reach: float = 0.0, stray: float = 0.0, goes_on: bool = False) -> None:
         """Collective. Bring in ghosts and images within `reach` [m] of this rank's blocks, and find the forces that
         points exert on each other. `goes_on`: a step that has begun goes on with another sub-step; `stray` [m]: how far

@@ -104,6 +104,7 @@ class Solid:
         self.work = np.zeros(blocks.local_count)
         self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
         self._home: DualArray | None = None
+        self._shown: list[str] = []
         self.sub_steps = 0
         self._own_particles(scene)
 
@@ -236,6 +237,13 @@ class Solid:
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
         self._groups = Groups(self.team, self.kernels, sizes, self._order)
 
+    def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
+        """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
+        into field files if it is `shown`."""
+        self.columns[name] = values
+        if shown:
+            self._shown.append(name)
+
     def _sorted(self, *names: str) -> dict[str, np.ndarray]:
         """The columns of these names by (block, body, id), an order that depends on nothing else."""
         return {name: self.columns[name][self._order] for name in names}
@@ -337,7 +345,7 @@ class Solid:
         c = {name: column[rows] for name, column in self.columns.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
-        names += [name for name in ("piece", "dust") if name in c]
+        names += [name for name in ("piece", *self._shown) if name in c]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant
 

@@ -22,10 +22,10 @@ from scipy.optimize.elementwise import find_root
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
-from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 
 Array = NDArray[np.float64]
+ExactEos = IdealGas | StiffenedGas | Jwl  # those whose isentropes are written down here
 
 LEFTWARD, RIGHTWARD = -1, 1
 WEAK = 1e-5  # a pressure rise below WEAK rho c^2 is as good as isentropic: entropy rises with its cube
@@ -60,7 +60,7 @@ class Wave:
 class Material:
     """A fluid EOS through its isentropes; densities may be numbers or arrays."""
 
-    eos: FluidEos
+    eos: ExactEos
 
     @property
     def omega(self) -> float:
@@ -135,7 +135,7 @@ class Material:
         return brentq(mismatch, 1e-60 * start.density, 1.001 * start.density, xtol=_TINY, rtol=_RELATIVE)
 
 
-def wave_into(ahead: PureState, eos: FluidEos, pressure: float, direction: int) -> Wave:
+def wave_into(ahead: PureState, eos: ExactEos, pressure: float, direction: int) -> Wave:
     """The wave running in `direction` into `ahead` that leaves `pressure` [Pa] behind it."""
     material, rho0, p0, u0 = Material(eos), ahead.density, ahead.pressure, ahead.velocity
     c0 = float(material.sound_speed(rho0, p0))
@@ -157,7 +157,7 @@ def escape_velocity(state: PureState, eos: IdealGas | Jwl, direction: int) -> fl
     return state.velocity + direction * float(Material(eos).expansion_velocity(state, 0.0))
 
 
-def exact_piston(state: PureState, eos: FluidEos, velocity: float, direction: int = RIGHTWARD) -> Wave:
+def exact_piston(state: PureState, eos: ExactEos, velocity: float, direction: int = RIGHTWARD) -> Wave:
     """The wave that a wall moving with constant `velocity` [m/s] sends in `direction` into `state`.
 
     Raises ValueError if the wall leaves the fluid behind.
@@ -185,8 +185,8 @@ class RiemannSolution:
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
     p_star: float
     u_star: float
     left_wave: Wave
@@ -212,7 +212,7 @@ class RiemannSolution:
         return rho, u, p, is_left
 
 
-def exact_riemann(left: PureState, right: PureState, eos_left: FluidEos, eos_right: FluidEos) -> RiemannSolution:
+def exact_riemann(left: PureState, right: PureState, eos_left: ExactEos, eos_right: ExactEos) -> RiemannSolution:
     """Solve the Riemann problem of two fluids, each with its own EOS.
 
     Raises ValueError if the two move apart so fast that a vacuum opens between them.
@@ -229,7 +229,7 @@ def exact_riemann(left: PureState, right: PureState, eos_left: FluidEos, eos_rig
     return RiemannSolution(left, right, eos_left, eos_right, p, u, left_wave, right_wave)
 
 
-def _sample_side(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, ...]:
+def _sample_side(ahead: PureState, eos: ExactEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, ...]:
     """Density, velocity and pressure that one side's wave gives at x/t = `speed`."""
     beyond = direction * speed >= direction * wave.head
     columns = [
@@ -243,7 +243,7 @@ def _sample_side(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, sp
     return tuple(columns)
 
 
-def _fan(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, Array, Array]:
+def _fan(ahead: PureState, eos: ExactEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, Array, Array]:
     """Density, velocity and pressure inside a rarefaction fan, where u + direction c = x/t = `speed`."""
     material = Material(eos)
 

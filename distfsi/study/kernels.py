@@ -138,10 +138,11 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
-            coupling.absorb()
+            geometry, state = coupling.geometry, fluid.device_state
+            coupling.absorb(geometry.lists, geometry.walls)
             coupling.trapped()
-            coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)), TIME_STEP)
-            coupling.wall.add_balls(
+            coupling.drag(geometry, gpu.empty(1, np.int64), state, gpu.empty((solid.count, D)), TIME_STEP)
+            coupling.wall.add_spheres(
                 gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)
             )
         simulation.watch()

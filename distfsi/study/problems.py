@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
 from distfsi.scene.description import Ball, BoundaryKind, Box, HalfSpace, Performance, Scene, Shape
 from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
-from distfsi.study.exact import PureState, RiemannSolution, exact_riemann
+from distfsi.study.exact import ExactEos, PureState, RiemannSolution, exact_riemann
 from distfsi.study.radial import Rings, cylindrical_explosion
 
 INPUTS = shipped_inputs()
@@ -144,7 +144,7 @@ def riemann_of(scene: Scene) -> tuple[RiemannSolution, float]:
     """The exact solution of a tube whose second region is right of a plane, and the plane's x [m]."""
     phases, (left, right) = present(scene.fluid).phases, present(scene.fluid).regions[:2]
     side, other = (PureState(r.state.density, r.state.pressure, r.state.velocity[0]) for r in (left, right))
-    eos, other_eos = (phases[r.state.phase].eos for r in (left, right))
+    eos, other_eos = (cast(ExactEos, phases[r.state.phase].eos) for r in (left, right))
     return exact_riemann(side, other, eos, other_eos), of_kind(HalfSpace, right.shape).point[0]
 
 

@@ -7,9 +7,8 @@ from typing import NamedTuple
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
-from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
-from distfsi.study.exact import PureState
+from distfsi.study.exact import ExactEos, PureState
 
 AIR = IdealGas(gamma=1.4)
 WATER = StiffenedGas(gamma=4.4, p_inf=6.0e8)
@@ -106,8 +105,8 @@ class ShockTube(NamedTuple):
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
     p_star: float
     u_star: float
     shock: float

@@ -20,7 +20,6 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
 from distfsi.laws.fluid.ideal_gas import IdealGas
-from distfsi.laws.law import FluidEos
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.verdicts import VerdictMap, draw_verdicts
@@ -28,7 +27,7 @@ from distfsi.scene import load
 from distfsi.scene.description import FluidState, HalfSpace, Phase, Region, Scene
 from distfsi.simulation import Simulation
 from distfsi.study.choices import Method, name_of, settings, varied_alone
-from distfsi.study.exact import RIGHTWARD, Material, PureState, exact_riemann, wave_into
+from distfsi.study.exact import RIGHTWARD, ExactEos, Material, PureState, exact_riemann, wave_into
 from distfsi.study.problems import INPUTS, centers, fields, start
 from distfsi.study.references import AIR, WATER
 from distfsi.study.stability import Plane
@@ -56,8 +55,8 @@ class Tube:
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
 
 
 @dataclass(frozen=True)
