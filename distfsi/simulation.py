@@ -16,8 +16,10 @@ from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
+from distfsi.diagnostics.derived import DerivedFields
 from distfsi.diagnostics.gauges import GaugeRecorder
-from distfsi.diagnostics.peaks import Peaks, schlieren
+from distfsi.diagnostics.peaks import Peaks
+from distfsi.diagnostics.schlieren import Schlieren
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
@@ -42,6 +44,7 @@ class Simulation:
     timers    count the parts of a step (distfsi/step.py)
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
+    derived   fields of the cells for the output files, beside those of the fluid
     last_step   the step made last
     limited_by  what set it, as far as is known without asking other ranks: with the cell or particle named last
     loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
@@ -57,6 +60,7 @@ class Simulation:
     coupling: Coupling | None
     timers: Timers
     watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
+    derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
@@ -87,7 +91,11 @@ class Simulation:
         coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(team))
         if scene.output.peaks:
-            simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
+            peaks = Peaks(scene.output.peaks, fluid, coupling)
+            simulation.watchers.append(peaks)
+            simulation.derived.append(peaks)
+        if scene.output.schlieren:
+            simulation.derived.append(Schlieren(fluid))
         simulation.watchers += [GaugeRecorder(name, gauge, simulation) for name, gauge in scene.gauges.items()]
         return simulation
 
@@ -207,11 +215,8 @@ class Simulation:
         """Collective. Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
-        for watcher in self.watchers:
-            if isinstance(watcher, Peaks):
-                cells |= watcher.outputs(covered)
-        if self.scene.output.schlieren:
-            cells["schlieren"] = schlieren(self.fluid, covered)
+        for derived in self.derived:
+            cells |= derived.outputs(covered)
         if self.solid is None:
             return cells, None
         self.solid.label_pieces()

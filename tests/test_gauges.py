@@ -10,8 +10,8 @@ import pytest
 from distfsi.coupling.kernels.cells import COVERED
 from distfsi.device.interface import DualArray
 from distfsi.diagnostics.gauges import GaugeRecorder
-from distfsi.diagnostics.peaks import schlieren
 from distfsi.diagnostics.sampling import FluidSampler
+from distfsi.diagnostics.schlieren import schlieren
 from distfsi.errors import InputError
 from distfsi.gauges import Gauge, TableProbe, each_step
 from distfsi.mesh.communicator import Communicator
