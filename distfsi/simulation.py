@@ -49,7 +49,7 @@ class Simulation:
     limited_by  what set it, as far as is known without asking other ranks: with the cell or particle named last
     loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
               was dropped, and the solid goes on alone
-    asked     what this rank is asked for; looked at once in every step
+    requested     what this rank is asked for; looked at once in every step
     """
 
     scene: Scene
@@ -67,7 +67,7 @@ class Simulation:
     limited_by: str = str(Reason.START)
     loaded: bool = False
     alone: bool = False
-    asked: Callable[[], Request] = lambda: Request.NOTHING
+    requested: Callable[[], Request] = lambda: Request.NOTHING
 
     @classmethod
     def of(
@@ -83,13 +83,13 @@ class Simulation:
         `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
         """
         blocks = deal_blocks(scene, communicator, costs)
-        team = device or Team(threads or threads_of_rank(communicator))
+        device = device or Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
-        solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
+        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
-        coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(team))
+        coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
         if scene.output.peaks:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)
@@ -132,7 +132,7 @@ class Simulation:
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
-        given = (self.time, self.scene.time, self.asked(), self.communicator, self.timers)
+        given = (self.time, self.scene.time, self.requested(), self.communicator, self.timers)
         with self.timers("time step"):
             return time_step(*self._active, *given)
 

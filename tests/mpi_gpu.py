@@ -116,7 +116,7 @@ def coupled_state(simulation):
     """What there is of it."""
     fluid, coupling = simulation.fluid, simulation.coupling
     cells = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
-    books = [*fluid.totals(coupling.volume), *coupling.ledger().values(), np.array([simulation.time])]
+    books = [*fluid.totals(coupling.volume), *coupling.budget_by_cause().values(), np.array([simulation.time])]
     peaks = simulation.watchers[0].snapshot()["cells"]["fields"]
     columns = [column.copy() for column in simulation.solid.columns.values()]
     return [*cells, peaks.copy(), *columns, *books]

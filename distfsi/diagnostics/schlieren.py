@@ -32,7 +32,7 @@ def schlieren(fluid: Fluid, covered: np.ndarray | None) -> np.ndarray:
     for axis, h in enumerate(fluid.blocks.grid.spacing[: fluid.model.dimensions]):
         squared += (_slope(density, usable, 3 - axis) / h) ** 2
     gradient = padded(fluid, np.sqrt(squared), covered)
-    largest = fluid.blocks.communicator.maximum([np.nanmax(gradient, initial=0.0)])[0]
+    largest = fluid.blocks.communicator.maximum(np.array([np.nanmax(gradient, initial=0.0)]))[0]
     return gradient / largest if largest > 0.0 else gradient
 
 

@@ -188,7 +188,7 @@ class TotalLagrangian:
         self._key = key
         self._partner = self._rows_of_partners(c, key.host)
         n, width = self._partner.shape
-        if n and self._rows.least(self._partner.reshape(-1))[0] < 0:
+        if n and self._rows.minimum(self._partner.reshape(-1))[0] < 0:
             raise Diverged("solid: the partner of a bond is not at hand")
         self._bond = self._device.empty((n, width * (self._dimensions + 1)))
         (body,) = c.read("body")
