@@ -604,6 +604,17 @@ class Softer(Spring):
         return HALF * (x - self.rest)
 
 
+@dataclass(frozen=True)
+class Nothing:
+    """A law without numbers."""
+
+    def force(self, x):
+        return self.half(x)
+
+    def half(self, x):
+        return HALF * x
+
+
 class Memory(NamedTuple):
     """What a material remembers: the scene says what that is."""
 
@@ -681,6 +692,19 @@ def test_records_are_flattened_for_both_writers():
     other = np.zeros(3)
     HostKernel(kernel)(3, kernel.given((pair, other)))
     assert other.tolist() == out.tolist()
+
+
+@driver
+def push(begin, end, out):
+    for i in range(begin, end):
+        law = tuple(0.0 for _ in static_range(N))
+        out[i] = first_material(law, out[i])
+
+
+def test_a_law_may_have_no_numbers():
+    out = np.array([3.0])
+    cpu.build([push], {"N": 0}, {"first_material": Bound.from_table(Nothing, "force")}).push(0, 1, out)
+    assert out.tolist() == [Nothing().force(3.0)]
 
 
 def test_the_scene_chooses_a_record_whose_fields_have_numbers():

@@ -10,8 +10,7 @@ from collections.abc import Container, Iterator, Mapping
 import numpy as np
 from scipy.spatial import cKDTree
 
-from distfsi.laws.solid.eos.compaction import Compaction
-from distfsi.laws.solid.strength.concrete import Concrete
+from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
     Ball,
@@ -187,8 +186,10 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
-    if isinstance(body.eos, Compaction) != isinstance(body.strength, Concrete):
-        yield Fault((*path, "strength"), "'concrete' and the eos 'compaction' need each other")
+    for key, law, other in (("eos", body.eos, body.strength), ("strength", body.strength, body.eos)):
+        if law.needs not in ("", word_of(type(other))):
+            wanted = "strength" if key == "eos" else "eos"
+            yield Fault((*path, key), f"'{word_of(type(law))}' needs the {wanted} '{law.needs}'")
 
 
 def _cut_off_axis(shape: Shape, domain: Domain) -> bool:

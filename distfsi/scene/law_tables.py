@@ -28,7 +28,8 @@ def table_of(law: type[Law], key: str | None = None, word: str | None = None) ->
     """The table of a law; where there are several `key` = `word` chooses this one."""
     types = get_type_hints(law)
     chosen = {key: (Literal[word], ...)} if key else {}
-    entries = {each.name: _field(types[each.name], each.metadata["entry"]) for each in fields(law)}
+    given = [each for each in fields(law) if each.init]
+    entries = {each.name: _field(types[each.name], each.metadata["entry"]) for each in given}
     summary = law.__doc__.partition("\n\n")[0]
     table = create_model(law.__name__, __base__=LawTable, __doc__=summary, __module__=__name__, **chosen, **entries)
     table.describes, table.word = law, key

@@ -10,10 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.laws.solid.eos.compaction import Compaction
-from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
-from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
@@ -196,15 +193,8 @@ def _inverse_sum(domain: Domain) -> float:
 
 def solid_sound(body: Body) -> float:
     """Longitudinal sound speed [m/s] of a body at rest."""
-    match body.eos:
-        case LinearEos(bulk_modulus):
-            bulk = bulk_modulus
-        case Compaction(crush_pressure, crush_strain):
-            bulk = crush_pressure / crush_strain
-        case MieGrueneisen(c0):
-            bulk = body.density * c0**2
-    shear = 0.0 if isinstance(body.strength, NoStrength) else body.strength.shear_modulus
-    return math.sqrt((bulk + 4.0 / 3.0 * shear) / body.density)
+    bulk = body.density * body.eos.reference_sound_speed(body.density) ** 2
+    return math.sqrt((bulk + 4.0 / 3.0 * body.strength.shear_modulus) / body.density)
 
 
 def solid_rate(scene: Scene, body: Body) -> float:
