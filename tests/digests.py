@@ -37,6 +37,9 @@ RENAMED: dict[str, str] = {
     "restart/coupling/values/way": "restart/coupling/values/drift",
     "restart/solid/particles/ball": "restart/solid/particles/inflation",
     "restart/solid/particles/dust": "restart/solid/particles/lone",
+    "restart/solid/particles/around": "restart/solid/particles/neighbourhood_damage",
+    "restart/solid/particles/loose": "restart/solid/particles/detaching",
+    "restart/solid/particles/parted": "restart/solid/particles/rupture_length",
     "particles/dust": "particles/lone",
     "gauges/particle.csv/dust": "gauges/particle.csv/lone",
 }

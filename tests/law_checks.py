@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from distfsi.coupling.formulas import moving_wall
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load, thermodynamics
 from distfsi.simulation import Simulation

@@ -10,7 +10,7 @@ from distfsi.coupling.cut_cells.kernels.redistribution import redistribute
 from distfsi.device import cpu
 from distfsi.device.markers import driver
 from distfsi.fluid.formulas.relaxation import halved_range, phases_before, range_of_change, relaxed_fraction_change
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import FLUXES, VARIABLES, primitives, reference_1, reference_2, updated
 from distfsi.mesh.communicator import Communicator

@@ -15,15 +15,19 @@ from distfsi.device import llvm_text
 from distfsi.device.fold import parameters_of
 from distfsi.device.native import Native
 from distfsi.diagnostics.kernels import peaks
-from distfsi.fluid.kernels import stage as fluid
+from distfsi.fluid.kernels import rows as fluid
+from distfsi.fluid.kernels.records import StageStep
+from distfsi.fluid.kernels.signals import signal_row
 from fluids import model_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"
 )
 
-ROWS = (fluid.primitives_row, fluid.rises_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
-REALS = ("cx", "cy", "cz", "rate", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
+ROWS = (fluid.primitives_row, fluid.increments_row, fluid.flux_row, fluid.update_row, signal_row, peaks.peaks_row)
+REALS = {"rx", "ry", "rz", "ambient", "threshold", "time", "dt", "faces_rate"} | {
+    f"step_{name}" for name in StageStep._fields
+}
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),
@@ -39,13 +43,19 @@ METHOD = {
 WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
 
+@pytest.fixture(autouse=True)
+def _nothing_compiled_before(tmp_path, monkeypatch):
+    """What is found on disk cannot be looked at."""
+    monkeypatch.setenv("DISTFSI_CACHE", str(tmp_path))
+
+
 def native_row(row, scene):
     """A row for a scene, as if it were a driver, and arguments: arrays (upper-case names), reals and integers."""
     names, dimensions, real = SCENES[scene]
     model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
     arguments = [
         np.zeros(1, np.uint8 if name == "K" else real)
-        if name.isupper() or name.startswith("U_")
+        if name.isupper() or name.startswith(("U_", "states_"))
         else np.dtype(real).type(0)
         if name in REALS
         else 0
@@ -75,7 +85,7 @@ def test_rows_are_packed(row, scene):
     own, other = ("d", "s") if real == "float64" else ("s", "d")
     code = machine_code(*native_row(row, scene))
     bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
-    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.rises_row else 1
+    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.increments_row else 1
     assert len(bodies) >= loops
     assert sum(count(body, "mul|div|sqrt", "s" + own, ["xmm"]) for body in bodies) == 0
     for operation in ("mul", "div", "sqrt"):

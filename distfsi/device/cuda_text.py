@@ -129,7 +129,7 @@ def formulas_by_hand(
 ) -> tuple[Emission, dict[str, Callee]]:
     """The formulas that a hand-written kernel calls, as far as a scene binds them, by the names in which it does."""
     emission, names = Emission(constants, bindings), [n for n in driver.__by_hand__.formulas if n in bindings]
-    return emission, {n: emission.add(bindings[n].function, bindings[n], "__" + n) for n in names}
+    return emission, {n: emission.add_bound(n) for n in names}
 
 
 def numbers_of(

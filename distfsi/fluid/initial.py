@@ -6,7 +6,8 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
 from distfsi.scene.description import Fluid, FluidState
 from distfsi.scene.shapes import cell_fractions, contains
@@ -22,7 +23,7 @@ class InitialState:
     for it.
     """
 
-    def __init__(self, fluid: Fluid, model):
+    def __init__(self, fluid: Fluid, model: FluidModel):
         self.fluid, self.model = fluid, model
         self._conserved, self._primitives = (model.formula(name) for name in ("conserved", "primitives"))
         self._references, self._omegas = (
@@ -48,8 +49,8 @@ class InitialState:
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
             centers = blocks.cell_centers(block)[:dimensions]
-            active = (slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True))
-            cells = field[(block, slice(None), *active)]
+            active = [slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True)]
+            cells = field[block, :, active[0], active[1], active[2]]
             for region, state in zip(self.fluid.regions, states, strict=True):
                 new = state[:, None, None, None]
                 if region.shape is None:
@@ -123,7 +124,7 @@ class InitialState:
 
         reference_of, omega_of = self._references[phase], self._omegas[phase]
 
-        def slope(p, rho):
+        def slope(p: float, rho: np.ndarray) -> list[float]:
             (reference, gradient), (omega, omega_slope) = reference_of(rho[0]), omega_of(rho[0])
             weight = 1.0 + rho[0] * omega_slope / omega
             return [1.0 / (gradient + (weight * (p - reference) + omega * p) / rho[0])]

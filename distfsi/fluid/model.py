@@ -5,7 +5,9 @@ A new equation of state is one file in laws/fluid/.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, r
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
+from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, Scene
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
@@ -23,7 +26,9 @@ RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost l
     "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
     "weno5": (reconstruction.weno5, limiters.van_leer, 3),
 }
-RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
+RIEMANN_SOLVERS: dict[
+    str, tuple[Callable[..., Any], ...]
+] = {  # bounding speeds, diffusion across contacts, viscosity along faces
     "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
     "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
@@ -34,10 +39,7 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 @dataclass(frozen=True)
 class FluidModel:
-    """Everything the fluid's kernels are specialised with, and the meaning of its variables.
-
-    mirror: per variable the axis whose reflection changes its sign, -1 for none.
-    """
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables."""
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
@@ -47,11 +49,13 @@ class FluidModel:
 
     @property
     def phases(self) -> int:
+        """How many materials there are."""
         return len(self.eos)
 
     @property
     def variables(self) -> int:
-        return self.constants["VARIABLES"]
+        """Stored fields per cell."""
+        return of_kind(int, self.constants["VARIABLES"])
 
     @property
     def conserved(self) -> int:
@@ -60,11 +64,12 @@ class FluidModel:
 
     @property
     def mirror(self) -> np.ndarray:
+        """(variables,) the axis whose reflection changes the sign of each, -1 for none."""
         axes = np.full(self.variables, -1, dtype=np.int64)
         axes[self.phases : self.phases + self.dimensions] = np.arange(self.dimensions)
         return axes
 
-    def formula(self, name: str):
+    def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
         bound = self.bindings[name]
         return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
@@ -72,13 +77,13 @@ class FluidModel:
 
 def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
-    fluid: Fluid = scene.fluid
+    fluid = present(scene.fluid)
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
     eos = tuple(phase.eos for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
-    curved = reconstructed is reconstruction.weno5
+    asymmetric = reconstructed is reconstruction.weno5
     body_force = BodyForce(scene.sources, dimensions)
     constants = {
         "DIMENSIONS": dimensions,
@@ -88,20 +93,21 @@ def fluid_model(scene: Scene) -> FluidModel:
         "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
-        "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
+        "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
-        "SHARPENED": phases == 2 and (fluid.sharpening or curved),
-        "CURVED": curved,
-        "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
+        "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
+        "ASYMMETRIC": asymmetric,
+        "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
-    if constants["FINISHES"]:
+    if constants["BISECTION_FALLBACK"]:
         bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
         bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
-    bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
+    positive = ("limiter_indicator", "is_admissible", "limited_flux")
+    bindings |= {name: Bound(getattr(positivity, name)) for name in positive}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
     bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(

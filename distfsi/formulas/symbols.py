@@ -42,11 +42,11 @@ REST_DENSITY = Symbol("density at which energies that are counted from rest vani
 CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas, to the root of a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
-FINISHES = Symbol("whether relaxation may need more than its fixed number of steps")
+BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed number of fits: then bisection")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
-CURVED = Symbol("whether primitives rise by different amounts on the two sides of a cell's mean")
-LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside its two cells")
+ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
+TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
@@ -58,7 +58,8 @@ stored_reference_1 = chosen(
 stored_reference_2 = chosen("stored_reference_2", "as reference_2, to the energy that is stored")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
 reconstructed = chosen(
-    "reconstructed", "cells around and with one -> rise from its low face to its mean, on to its high face"
+    "reconstructed",
+    "cells around and with one -> increments from its low face to its mean, from there to its high face",
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
 primitives = chosen("primitives", "conserved state -> primitive state")
@@ -68,7 +69,9 @@ bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest 
 contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
 slip_viscosity = chosen("slip_viscosity", "impedances, pressure jump, rho c^2 -> momentum flux per slip [kg/(m2 s)]")
 state_behind_wave = chosen("state_behind_wave", "primitive state, wave and face speeds -> all transported densities")
-reserve = chosen("reserve", "cell means, flux, sound speed, rate -> negative where the flux may need limiting")
+limiter_indicator = chosen(
+    "limiter_indicator", "cell means, flux, sound speed, rate -> negative where the flux may need limiting"
+)
 is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the flux alone leaves both cells valid")
 limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")
 updated = chosen("updated", "the state after a Runge-Kutta stage")

@@ -45,7 +45,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
-MOST_CELLS, MOST_PARTICLES = 1e11, 1e8
+MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
 
 
@@ -87,8 +87,8 @@ def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(("domain", "upper"), f"must be greater than lower along {AXES[axis]}")
         if domain.boundaries[axis].count("periodic") == 1:
             yield Fault(path, "one end is periodic; expected both or none")
-    if (count := math.prod(domain.cells)) > MOST_CELLS:
-        yield Fault(("domain", "cells"), f"{count:.1e} cells; at most {MOST_CELLS:.0e}")
+    if (count := math.prod(domain.cells)) > MAXIMUM_CELLS:
+        yield Fault(("domain", "cells"), f"{count:.1e} cells; at most {MAXIMUM_CELLS:.0e}")
 
 
 def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
@@ -115,11 +115,11 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
     """A mixture needs two phases within their bounds, a state a real sound speed."""
     if state.volume_fraction is not None:
-        least = fluid.minimum_volume_fraction
+        limit = fluid.minimum_volume_fraction
         if len(fluid.phases) < 2:
             yield Fault((*path, "volume_fraction"), "needs two phases")
-        elif not least <= state.volume_fraction <= 1.0 - least:
-            yield Fault((*path, "volume_fraction"), f"expected {least:g} to 1 - {least:g} (`minimum_volume_fraction`)")
+        elif not limit <= state.volume_fraction <= 1.0 - limit:
+            yield Fault((*path, "volume_fraction"), f"expected {limit:g} to 1 - {limit:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
     if state.density >= phase.eos.maximum_density:
         text = f"too high: '{phase.name}' has states below {phase.eos.maximum_density:.6g} kg/m3 only"
@@ -161,8 +161,8 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield from faults
             continue
         yield from _check_extent((*path, "shape"), body, domain)
-        if (count := _number_of_particles(body, domain)) > MOST_PARTICLES:
-            text = f"{body.spacing:.6g} m makes about {count:.1e} particles; at most {MOST_PARTICLES:.0e}"
+        if (count := _number_of_particles(body, domain)) > MAXIMUM_PARTICLES:
+            text = f"{body.spacing:.6g} m makes about {count:.1e} particles; at most {MAXIMUM_PARTICLES:.0e}"
             yield Fault((*path, "spacing"), text)
             continue
         positions, _ = pack(body, domain.lower, domain.upper)
@@ -282,25 +282,25 @@ def check_gauges(
         if material not in present:
             yield Fault((*path, "kind"), f"'{gauge.kind}' needs a {material}")
         elif material == "fluid":
-            yield from _check_place(path, gauge, domain)
+            yield from _check_position(path, gauge, domain)
         elif solid is not None and gauge.body not in (bodies := [body.name for body in solid.bodies]):
             yield Fault((*path, "body"), f"'{gauge.body}' is no body" + one_of(bodies, gauge.body))
 
 
-def _check_place(path: Path, gauge: PointGauge | LineGauge | PlaneGauge, domain: Domain) -> Iterator[Fault]:
+def _check_position(path: Path, gauge: PointGauge | LineGauge | PlaneGauge, domain: Domain) -> Iterator[Fault]:
     ends = dict(zip(AXES, zip(domain.lower, domain.upper, strict=True), strict=False))
     match gauge:
         case PointGauge(position=position):
-            places = {"position": dict(zip(AXES, position, strict=False))}
+            positions = {"position": dict(zip(AXES, position, strict=False))}
         case LineGauge(start=start, end=end):
-            places = {"from": dict(zip(AXES, start, strict=False)), "to": dict(zip(AXES, end, strict=False))}
+            positions = {"from": dict(zip(AXES, start, strict=False)), "to": dict(zip(AXES, end, strict=False))}
         case PlaneGauge(axis=axis, position=position):
             if domain.dimensions == 1 or axis not in ends:
                 yield Fault((*path, "axis"), f"'{axis}' in a domain of {domain.dimensions} dimension(s)")
                 return
-            places = {"position": {axis: position}}
-    for key, place in places.items():
-        if not all(ends[axis][0] <= x <= ends[axis][1] for axis, x in place.items()):
+            positions = {"position": {axis: position}}
+    for key, position in positions.items():
+        if not all(ends[axis][0] <= x <= ends[axis][1] for axis, x in position.items()):
             yield Fault((*path, key), "lies outside the domain")
 
 

@@ -21,7 +21,7 @@ from distfsi.formulas.symbols import CLOSED_FORM, MINIMUM_FRACTION, grueneisen_1
 
 REFITS = 3  # with JWL both pressures agree to 1e-6 after imbalances up to a factor 2, to 1e-2 after a factor 10
 SETTLED = 1e-6  # of the smaller volume fraction: the last fit's step, whose error is about its square
-TRACE = 1e-5  # the least volume fraction that counts as such: smaller ones are settled to its square all the same
+TRACE = 1e-5  # the smallest volume fraction that counts as such: smaller ones are settled to its square all the same
 DEEPEST = -0.9  # a phase pressure may fall by this part of p + P in one stage; the total energy is not touched
 NEAREST = 1.000001  # to the volume at which a phase's pressure has no bound
 
@@ -131,5 +131,5 @@ def halved_range(phases, low, high):
     """The half of the range low … high in which the change of a1 is that gives both phases one pressure."""
     middle = 0.5 * (low + high)
     now1, stiff1, now2, stiff2 = phases_after(phases, middle)
-    rises = now1 > now2
-    return (middle if rises else low, high if rises else middle)
+    increases = now1 > now2
+    return (middle if increases else low, high if increases else middle)

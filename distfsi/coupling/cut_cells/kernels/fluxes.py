@@ -21,9 +21,10 @@ from distfsi.coupling.formulas.moving_wall import normal_of, stage_content, wall
 from distfsi.coupling.kernels.cells import FLUID
 from distfsi.coupling.kernels.faces import BOX, LINE, flux_of_face, look_at_face
 from distfsi.device.markers import driver, helper, load, real, row, store, workspace
-from distfsi.fluid.kernels.stage import face_fluxes, place, primitives_row, rises_row
+from distfsi.fluid.kernels.records import Faces, position_of
+from distfsi.fluid.kernels.rows import face_fluxes, increments_row, primitives_row
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FLUXES, LANES, LOOKS_SIDEWAYS, PHASES, VARIABLES, primitives
+from distfsi.formulas.symbols import DIMENSIONS, FLUXES, LANES, PHASES, TRANSVERSE_SENSOR, VARIABLES, primitives
 from distfsi.formulas.tensors import dot
 from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_volume, first_value
 
@@ -90,7 +91,7 @@ def look_at_faces(U, Q, at, lane, axis, grid: BlockGrid):
     for v in range(VARIABLES):
         for c in range(4):
             store(Q, (v * BOX + LINE + c) * LANES + lane, load(U, first + v * cells + (c - 1) * step))
-        if LOOKS_SIDEWAYS:
+        if TRANSVERSE_SENSOR:
             for d in range(1, DIMENSIONS):
                 aside = grid.steps[(axis + d) % DIMENSIONS]
                 for c in range(1, 3):
@@ -103,7 +104,7 @@ def look_at_faces(U, Q, at, lane, axis, grid: BlockGrid):
 def primitives_of_faces(Q, P):
     """P = primitives of the states Q around LANES faces."""
     primitives_row(Q, P, LINE * LANES, BOX * LANES, LINE * LANES, BOX * LANES, 4 * LANES)
-    if LOOKS_SIDEWAYS:
+    if TRANSVERSE_SENSOR:
         for line in range(1 - DIMENSIONS, DIMENSIONS):
             if line != 0:
                 first = (LINE + 4 * line + 1) * LANES
@@ -148,19 +149,29 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
             primitives_of_faces(Q, P)
             # their reconstruction, which ends at the wall
             c = (LINE + 1) * LANES
-            rises_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
+            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
             for i in range(n):
                 stop_slopes(T, i, seen[faces[first + i]] - 1)
             # fluxes
-            rate = real(2 * DIMENSIONS) * real(dt / grid.spacing[axis])
-            face_fluxes(
-                P, T, F, c, BOX * LANES, LANES, 4 * LANES, 8 * LANES, 0, LANES, 2 * LANES, 0, axis, rate, LANES, LANES
+            faces_of_box = Faces(
+                cell=c,
+                variables=BOX * LANES,
+                across=LANES,
+                beside_1=4 * LANES,
+                beside_2=8 * LANES,
+                low=0,
+                high=LANES,
+                flux=0,
+                rows=2 * LANES,
+                axis=axis,
+                rate=real(2 * DIMENSIONS) * real(dt / grid.spacing[axis]),
             )
+            face_fluxes(P, T, F, faces_of_box, LANES, LANES)
             for i in range(n):
                 face = faces[first + i]
                 m, to = face % per_axis // 2, (2 * axis + face % 2) * FLUXES
                 for v in range(FLUXES):
-                    flux[m, to + v] = load(F, 2 * place(v, axis) * LANES + i)
+                    flux[m, to + v] = load(F, 2 * position_of(v, axis) * LANES + i)
             first += n
 
 
@@ -320,4 +331,4 @@ def account_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls,
             if amount != 0.0:
                 flux_of_face(P, T, F, dt, axis, grid)
                 for v in range(PHASES + DIMENSIONS + 1):
-                    passed[n, v] += amount * load(F, 2 * place(v, axis))
+                    passed[n, v] += amount * load(F, 2 * position_of(v, axis))

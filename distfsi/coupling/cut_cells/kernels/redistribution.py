@@ -17,9 +17,9 @@ from distfsi.coupling.formulas.moving_wall import state_before_relaxation, state
 from distfsi.coupling.kernels.cells import FLUID, ISOLATED
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.fluid.formulas.relaxation import halved_range, range_of_change
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FINISHES, LANES, PHASES, VARIABLES
+from distfsi.formulas.symbols import BISECTION_FALLBACK, DIMENSIONS, LANES, PHASES, VARIABLES
 from distfsi.mesh.kernels.grid import BlockGrid, block_size, step_to
 
 MINIMUM_TRAPPED = 1e-3  # of a cell: the least volume of fluid that is trapped
@@ -188,7 +188,7 @@ def redistribute(begin, end, band, new, contents: Contents, fraction, merging: M
         for i in range(lanes):
             for v in range(VARIABLES):
                 new[box * LANES + i, v] = load(S, v * LANES + i)
-            if FINISHES:
+            if BISECTION_FALLBACK:
                 if load(S, VARIABLES * LANES + i) < 0.0:
                     new[box * LANES + i, VARIABLES - 1] = relaxed_by_bisection(Q, i)
 

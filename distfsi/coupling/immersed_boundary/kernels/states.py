@@ -6,7 +6,7 @@ from distfsi.coupling.formulas.immersed import impulse_on_wall, moving_with
 from distfsi.coupling.kernels.cells import COVERED, FLUID
 from distfsi.coupling.kernels.faces import BOX, flux_of_face, look_at_face
 from distfsi.device.markers import driver, helper, load, store, workspace
-from distfsi.fluid.kernels.stage import place
+from distfsi.fluid.kernels.records import position_of
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
 from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_volume, first_value
@@ -102,7 +102,7 @@ def add_flux(passed, n, U, at, axis, dt, weight, grid: BlockGrid, P, T, F):
     look_at_face(U, at, axis, grid, P, T)
     flux_of_face(P, T, F, dt, axis, grid)
     for v in range(PHASES + DIMENSIONS + 1):
-        passed[n, v] += weight * load(F, 2 * place(v, axis))
+        passed[n, v] += weight * load(F, 2 * position_of(v, axis))
 
 
 @driver
