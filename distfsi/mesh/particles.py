@@ -136,12 +136,12 @@ class ParticleExchange:
         planes: list[tuple[int, float]],
         bonded: np.ndarray | None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The axes (n,), as bits, along which particles have images, and where the planes are (n, dimensions)."""
+        """The axes (n,), as bits, along which particles have images, and where (n, dimensions) [m] the planes are."""
         near, plane = np.zeros(len(id), dtype=np.int64), np.zeros_like(position)
-        for axis, plane_at in planes:
-            close = np.abs(position[:, axis] - plane_at) <= reach
+        for axis, at in planes:
+            close = np.abs(position[:, axis] - at) <= reach
             near[close] |= 1 << axis
-            plane[close, axis] = plane_at
+            plane[close, axis] = at
         if bonded is not None:
             self._need_images(position, id, bonded, planes, near, plane)
         return near, plane
@@ -177,8 +177,8 @@ class ParticleExchange:
         rows = order[np.searchsorted(id, bonded // IMAGES, sorter=order)]
         np.bitwise_or.at(near, rows, bonded % IMAGES)
         for axis in {axis for axis, _ in planes}:
-            parallel = np.array([at for a, at in planes if a == axis])
-            nearest = parallel[np.argmin(np.abs(position[rows, axis][:, None] - parallel), axis=1)]
+            along = np.array([at for a, at in planes if a == axis])
+            nearest = along[np.argmin(np.abs(position[rows, axis][:, None] - along), axis=1)]
             plane[rows, axis] = nearest
 
     def _bonded(self, id: np.ndarray, bonded: np.ndarray | None) -> dict[int, np.ndarray]:
@@ -194,7 +194,7 @@ class ParticleExchange:
         """rank * own + row of the particles (n,) of the `rows` at the positions (n, dimensions) that are within `reach`
         of other ranks' blocks."""
         blocks = self.blocks
-        lowest, highest = (blocks.coordinates_of(end).T for end in (position - reach, position + reach))
+        lowest, highest = (blocks.coordinates_of(corner).T for corner in (position - reach, position + reach))
         pairs = [np.empty(0, dtype=np.int64)]
         for offset in product(*(range(n + 1) for n in (highest - lowest).max(axis=1, initial=0))):
             block = lowest + np.array(offset)[:, None]
@@ -205,15 +205,15 @@ class ParticleExchange:
         return pairs
 
     def planes(self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",)) -> list[tuple[int, float]]:
-        """(axis, position [m]) of the planes that mirror. Raises InputError where two are nearer than twice `reach`."""
+        """(axis, position [m]) of the planes that mirror; raises InputError when two are closer than twice `reach`."""
         grid = self.blocks.grid
         planes = []
         for axis in range(grid.dimensions):
             ends = zip(grid.boundaries[axis], (grid.lower[axis], grid.upper[axis]), strict=True)
-            positions = [position for kind, position in ends if kind in mirrors]
-            if len(positions) == 2 and positions[1] - positions[0] <= 2 * reach:
-                raise InputError([f"domain: planes {positions} m that mirror are less than {2 * reach} m apart"])
-            planes += [(axis, position) for position in positions]
+            found = [at for kind, at in ends if kind in mirrors]
+            if len(found) == 2 and found[1] - found[0] <= 2 * reach:
+                raise InputError([f"domain: planes {found} m that mirror are less than {2 * reach} m apart"])
+            planes += [(axis, at) for at in found]
         return planes
 
 
@@ -232,7 +232,7 @@ class Key:
 
 
 class Images:
-    """On the device: the rows (count,) that images are of, the axes that mirror them, and where the planes are."""
+    """On the device: the rows (count,) that images are of, the axes they are mirrored along, where the planes are."""
 
     def __init__(self, device: Device, source: np.ndarray, mask: np.ndarray, plane: np.ndarray) -> None:
         self.count = len(source)

@@ -16,8 +16,8 @@ import numpy as np
 
 from distfsi.mesh.blocks import Blocks
 
-# A run of cells along one axis of a block. `block` and `source` are indices of blocks along it, starts are indices in
-# their memory. ghost 0: the block's own active cells; flip 1: mirrored; inflow: the side whose constant it is or -1.
+# A run of cells along one axis of a block. `block` and `source` count blocks along the axis, starts are indices
+# in their memory. ghost 0: the block's own active cells; flip 1: mirrored; inflow: the side whose constant it is or -1.
 RUN = np.dtype(
     {
         "names": ["block", "start", "length", "source", "source_start", "step", "flip", "inflow", "ghost"],
@@ -84,9 +84,9 @@ def products(runs: list[np.ndarray], coordinates: np.ndarray, end: str) -> np.nd
         first = np.searchsorted(run[end], wanted)
         number = np.searchsorted(run[end], wanted, side="right") - first
         repeat = np.repeat(np.arange(len(rows)), number)
-        index = np.arange(len(repeat)) - np.repeat(np.cumsum(number) - number, number)
+        nth = np.arange(len(repeat)) - np.repeat(np.cumsum(number) - number, number)
         rows = rows[repeat]
-        chosen = [other[repeat] for other in chosen] + [run[first[repeat] + index]]
+        chosen = [other[repeat] for other in chosen] + [run[first[repeat] + nth]]
     return np.stack(chosen, axis=1)
 
 
@@ -129,7 +129,7 @@ class Regions:
         return np.hstack([self.run["length"], flips[:, None], destination, source])
 
     def in_field(self, blocks: Blocks, variables: int, end: str) -> np.ndarray:
-        """Places (n, 5) of the `end` of each region in this rank's field."""
+        """Indices (n, 5) of the `end` of each region in this rank's field."""
         size_z, size_y, size_x = blocks.shape
         strides = np.array([1, size_x, size_x * size_y])
         cells = size_x * size_y * size_z
@@ -155,13 +155,13 @@ class Regions:
         return self.run["flip"] @ (1, 2, 4)
 
     def in_message(self, variables: int) -> np.ndarray:
-        """Places (n, 5) in a buffer that holds the regions one after the other."""
+        """Indices (n, 5) in a buffer that holds the regions one after the other."""
         nx, ny, _ = self.run["length"].T
         volume = self.volume
         return np.column_stack([(np.cumsum(volume) - volume) * variables, volume, np.ones_like(nx), nx, nx * ny])
 
     def in_constants(self, variables: int) -> np.ndarray:
-        """Places (n, 5) in the inflow constants (3, 2, variables); where two inflows meet the lower axis counts."""
+        """Indices (n, 5) in the inflow constants (3, 2, variables); where two inflows meet the lower axis counts."""
         inflow = self.run["inflow"]
         axis = np.argmax(inflow >= 0, axis=1)
         first = (2 * axis + inflow[np.arange(len(axis)), axis]) * variables

@@ -130,7 +130,7 @@ class BondNetwork:
         if key is not self._key:
             self._key, self._partner = key, self._rows_of_partners(c, key.host)
             n, width = self._partner.shape
-            if n and self._rows.smallest(self._partner.reshape(-1))[0] < 0:
+            if n and self._rows.minimum(self._partner.reshape(-1))[0] < 0:
                 raise Diverged("solid: the partner of a bond is not at hand")
             self._geometry = self._device.empty((n, width * (self._dimensions + 1)))
             bonds = Bonds(count, self._partner, self._geometry)

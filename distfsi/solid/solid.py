@@ -186,7 +186,7 @@ class Solid:
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
-        dt, index = rows.smallest(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        dt, index = rows.minimum(rows.taken(self._limits, self._groups.rows).reshape(-1))
         particle, cause = divmod(index, len(LIMITS))
         dt, id = float(dt), self.columns["id"][self._order[particle]]
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
