@@ -160,7 +160,7 @@ def test_what_breaks_and_moves_a_body(tmp_path, faults):
     one = "solid.bodies.one"
     assert faults(METAL, f"{one}.lattice_angle=30 deg", f"{one}.shape.radius=0.1", f"{one}.eos={COMPACTION}") == [
         f"{one}.lattice_angle (--set): needs packing = 'lattice', another shape than a half space, 2D or 3D",
-        f"{one}.eos (--set): 'compaction' needs the strength 'concrete'",
+        f"{one}.strength (line 15): 'concrete' and the eos 'compaction' need each other",
     ]
 
 

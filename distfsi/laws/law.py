@@ -141,17 +141,23 @@ class Rest(NamedTuple):
 class Trial(NamedTuple):
     """What a strength model is asked about: the material after a step without plastic flow, as if it were intact.
 
-    stress      von Mises stress [Pa]
-    pressure    [Pa]
-    density     [kg/m3]
-    rate        equivalent rate of strain [1/s]
-    compaction  growth in the step of the compression that stays without pressure
-    damage      0 to 1: what share of the intact stress is no longer carried
+    stress       von Mises stress [Pa]
+    pressure     [Pa]
+    density      [kg/m3]
+    compression  density over that at rest - 1
+    bulk         isentropic bulk modulus [Pa]
+    rest_bulk    bulk modulus at rest [Pa]
+    rate         equivalent rate of strain [1/s]
+    compaction   growth in the step of the compression that stays without pressure
+    damage       0 to 1: what share of the intact stress is no longer carried
     """
 
     stress: float
     pressure: float
     density: float
+    compression: float
+    bulk: float
+    rest_bulk: float
     rate: float
     compaction: float
     damage: float
@@ -233,6 +239,11 @@ class Strength(Law):
         """Von Mises stress [Pa], pressure [Pa] and increment of the plastic strain of a step; then all that is
         remembered. By default the material is elastic."""
         return (trial.stress, trial.pressure, 0.0)
+
+    def elastic_density(self, density, memory: StrengthMemory):
+        """What the equation of state takes for the `density` [kg/m3]: without the part of it that stays without
+        pressure, if that is the strength model's."""
+        return density
 
     def carried_share(self, pressure, damage):
         """What share of the deviatoric stress of the intact material is carried."""

@@ -22,7 +22,7 @@ from distfsi.solid.kernels.records import LawTables, RestState
 
 SCATTER = Column("strength_scatter", "1", "factor of the strength of the particle", initial=1.0, written=False)
 PRESSURE = Column("pressure", "Pa", "pressure that is carried")
-LEAST_MODULUS = 0.1  # of the bulk modulus at rest, which expanded hot material keeps
+MINIMUM_MODULUS = 0.1  # of the bulk modulus at rest, which expanded hot material keeps
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Material:
         """The formulas of the laws, and the records of what is remembered."""
         bound = {f"{name}_response": Bound.from_table(law, "respond") for name, law in self.laws.items()}
         bound["free_swelling"] = Bound.from_table(self.eos, "free_swelling")
-        for formula in ("carried_share", "homologous_temperature"):
+        for formula in ("elastic_density", "carried_share", "homologous_temperature"):
             bound[formula] = Bound.from_table(self.strength, formula)
         return bound | {record.__name__: record for record in self.memory}
 
@@ -156,7 +156,7 @@ def rest_state(bodies: tuple[Body, ...], width: float) -> RestState:
     return RestState(
         density,
         density * sound * sound,
-        LEAST_MODULUS * density * sound * sound,
+        MINIMUM_MODULUS * density * sound * sound,
         np.array([body.strength.shear_modulus for body in bodies]),
         np.array([body.strength.flow_stress_at_rest() for body in bodies]),
         np.array([width * body.spacing for body in bodies]),

@@ -70,6 +70,6 @@ def crack_energy(mises, pressure, shear_modulus, bulk_modulus):
     return mises * mises / max(6.0 * shear_modulus, SHEARLESS) + 0.5 * tension * tension / bulk_modulus
 
 
-def longitudinal_speed(density, bulk, shear_modulus, least_modulus):
-    """Longitudinal sound speed [m/s]; the bulk modulus is `least_modulus` or more."""
-    return sqrt((max(bulk, least_modulus) + 4.0 / 3.0 * shear_modulus) / density)
+def longitudinal_speed(density, bulk, shear_modulus, minimum_modulus):
+    """Longitudinal sound speed [m/s]; the bulk modulus is `minimum_modulus` or more."""
+    return sqrt((max(bulk, minimum_modulus) + 4.0 / 3.0 * shear_modulus) / density)

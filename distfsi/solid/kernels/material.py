@@ -22,6 +22,7 @@ from distfsi.formulas.symbols import (
     STRENGTH_COLUMNS,
     STRENGTH_FIELDS,
     carried_share,
+    elastic_density,
     eos_response,
     failure_response,
     free_swelling,
@@ -96,10 +97,11 @@ def deform(
         # Pressure of the intact material.
         at_rest = (rest.density[own], rest.bulk_modulus[own])
         known = tuple(eos_memory[k][i] for k in static_range(EOS_COLUMNS))
-        state = eos_response(eos, density, point.energy[i], at_rest, known)
+        held = tuple(strength_memory[k][i] for k in static_range(STRENGTH_COLUMNS))
+        state = eos_response(eos, elastic_density(strength, density, held), point.energy[i], at_rest, known)
         for k in static_range(EOS_COLUMNS):
             eos_memory[k][i] = state[3 + k]
-        point.sound_speed[i] = longitudinal_speed(density, state[1], shear_modulus, rest.least_modulus[own])
+        point.sound_speed[i] = longitudinal_speed(density, state[1], shear_modulus, rest.minimum_modulus[own])
 
         # Its deviatoric stress, as if it were elastic.
         spin = spin_of(rates, point.stretch, i, dt)
@@ -108,8 +110,8 @@ def deform(
 
         # Plastic flow brings it back to what the material bears.
         rate = 2.0 / 3.0 * von_mises(stretching(rates))
-        trial = (elastic, state[0], density, rate, state[2], damage)
-        held = tuple(strength_memory[k][i] for k in static_range(STRENGTH_COLUMNS))
+        compression = density / at_rest[0] - 1.0
+        trial = (elastic, state[0], density, compression, state[1], at_rest[1], rate, state[2], damage)
         flowed = strength_response(strength, trial, dt, held)
         for k in static_range(STRENGTH_COLUMNS):
             strength_memory[k][i] = flowed[3 + k]

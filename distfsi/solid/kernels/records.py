@@ -148,7 +148,7 @@ class RestState(NamedTuple):
 
     density           [kg/m3]
     bulk_modulus      [Pa]
-    least_modulus     [Pa] of the bulk, which expanded hot material keeps
+    minimum_modulus   [Pa] of the bulk, which expanded hot material keeps
     shear_modulus     [Pa]
     flow_stress       [Pa] von Mises stress at which plastic flow begins
     crack_width       [m] in which particles beside a crack take its energy
@@ -156,7 +156,7 @@ class RestState(NamedTuple):
 
     density: Any
     bulk_modulus: Any
-    least_modulus: Any
+    minimum_modulus: Any
     shear_modulus: Any
     flow_stress: Any
     crack_width: Any

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import exp, log
 
-from distfsi.laws.law import DAMAGE, Column, Failure, FailureMemory, Load, entry, number, quantity
-from distfsi.laws.solid.cracks import softening_share, tensile_damage
+from distfsi.laws.law import DAMAGE, Failure, FailureMemory, Load, entry, number, quantity
+from distfsi.laws.solid.cracks import DUCTILE_DAMAGE, ductile_softening, tensile_damage
 from distfsi.laws.solid.scatter import Scatter
 
 CRUSHED, HIGHEST_TRIAXIALITY = -1.0 / 3.0, 1.5  # below the one no void grows; above the other the law was not measured
@@ -16,8 +16,7 @@ CRUSHED, HIGHEST_TRIAXIALITY = -1.0 / 3.0, 1.5  # below the one no void grows; a
 class JohnsonCookFailure(Failure):
     """Fracture strain (D1 + D2 exp(D3 eta))(1 + D4 ln(rate/reference_rate))(1 + D5 T*), eta = mean/von Mises stress.
 
-    `ductile_damage` is the plastic strain over the fracture strain up to 1, and then 1 and the share of its energy that
-    the crack has taken by plastic flow.
+    `ductile_damage` is the plastic strain over the fracture strain, until that is 1.
     """
 
     D1: float = number("fracture strain at large tension")
@@ -32,19 +31,14 @@ class JohnsonCookFailure(Failure):
     )
     scatter: Scatter | None = entry("Weibull's scatter; default none", default=None)
 
-    columns = (DAMAGE, Column("ductile_damage", "1", "plastic strain over the fracture strain; above 1: softening"))
+    columns = (DAMAGE, DUCTILE_DAMAGE)
 
     def respond(self, load: Load, dt, width, memory: FailureMemory):
         # Plastic flow uses up the fracture strain.
         flows = load.increment > 0.0 and memory.ductile_damage < 1.0
         used = min(memory.ductile_damage + self.used_share(load, dt), 1.0) if flows else memory.ductile_damage
-        # Then its work, and that of the mean tension, opens a crack.
-        broken = used >= 1.0
-        worked = used + softening_share(load.increment * load.flow_stress, self.fracture_energy, width)
-        ductile = min(worked, 2.0) if broken else used
-        tension = min(load.pressure, 0.0)
-        stored = softening_share(0.5 * tension * tension / load.bulk, self.fracture_energy, width)
-        torn = max(memory.damage, min(ductile - 1.0 + stored, 1.0)) if broken else memory.damage
+        # Then its work opens a crack.
+        torn, ductile = ductile_softening(used, memory.damage, load, self.fracture_energy, width)
         # Spall.
         strength = load.factor * self.spall_strength
         opened = tensile_damage(load.principal, load.energy, strength, self.fracture_energy, width)
