@@ -26,5 +26,6 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of a file stay together; those that start ranks all in one process: they need both cores for themselves."""
     for item in items:
-        starts_ranks = "mpiexec" in item.fixturenames or hasattr(item.module, "run_ranks")
+        starters = ("run_ranks", "run_case")
+        starts_ranks = "mpiexec" in item.fixturenames or any(hasattr(item.module, name) for name in starters)
         item.add_marker(pytest.mark.xdist_group("ranks" if starts_ranks else item.path.stem))

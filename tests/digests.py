@@ -33,14 +33,21 @@ RENAMED: dict[str, str] = {
     "restart/accounts/values/start": "restart/budget/values/start",
     "history.csv/sealed mass_1 [kg]": "history.csv/trapped mass_1 [kg]",
     "history.csv/sealed mass_2 [kg]": "history.csv/trapped mass_2 [kg]",
+    "restart/coupling/cells/swept": "restart/coupling/cells/fluid_volume",
+    "restart/coupling/values/way": "restart/coupling/values/drift",
+    "restart/solid/particles/ball": "restart/solid/particles/inflation",
+    "restart/solid/particles/dust": "restart/solid/particles/lone",
+    "particles/dust": "particles/lone",
+    "gauges/particle.csv/dust": "gauges/particle.csv/lone",
 }
 
-# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work is no result.
-NO_RESULT = ("restart/scene", "balance.csv/")
+# The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work, and how
+# long it takes, is no result.
+NO_RESULT = ("restart/scene", "balance.csv/", "performance.csv/")
 
 # A particle whose ball has no radius is none. Where it would point is not read, and depends on the particles that are
 # looked at together with it, and so on the number of ranks.
-BALLS = "solid/particles/ball"
+BALLS = "solid/particles/inflation"
 
 Digests = dict[str, str]
 
@@ -210,10 +217,12 @@ def read_table() -> dict[str, dict]:
 
 def record(names: list[str]) -> None:
     """Run these cases on one rank and write their digests into the table, which loses what is no case any more."""
-    table = read_table() if TABLE.exists() else {"machine": machine(), "digests": {}}
-    if table["machine"] != machine() and set(names) != set(CASES):
-        raise SystemExit(f"the table is of another machine, so all cases must run anew: {table['machine']}")
-    table["machine"] = machine()
+    here = machine()
+    table = read_table() if TABLE.exists() else {}
+    if table.get("machine") != here:
+        if set(names) != set(CASES):
+            raise SystemExit(f"the table is of another machine, so all cases must run anew: {table.get('machine')}")
+        table = {"machine": here, "digests": {}}
     for name in names:
         started = time.perf_counter()
         with tempfile.TemporaryDirectory() as directory:

@@ -20,11 +20,10 @@ TRACE = 1e-6
 
 
 def model_of(
-    *names: str | FluidEos, dimensions: int = 1, gravity=None, limiter: str = "minmod", riemann: str = "hllc", **method
+    *names: str | FluidEos, dimensions: int = 1, sources=(), limiter: str = "minmod", riemann: str = "hllc", **method
 ) -> FluidModel:
     """The model of a fluid made of `MATERIALS`, or of other laws."""
     phases = tuple(Phase(str(name), name if isinstance(name, FluidEos) else MATERIALS[name]) for name in names)
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
     domain = SimpleNamespace(dimensions=dimensions)
-    gravity = gravity or (0.0,) * dimensions
-    return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, gravity=gravity))
+    return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, sources=sources))

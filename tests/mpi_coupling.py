@@ -65,7 +65,6 @@ class Coupled:
             title="test",
             domain=d.Domain(lower, upper, cells, kinds),
             time=d.Time(1e9, cfl, None, scheme=runge_kutta),
-            gravity=(0.0,) * D,
             fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
             solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form=form),
             output=d.Output("", 0.0, 1),

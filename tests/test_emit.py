@@ -49,7 +49,7 @@ def types_of(function, real="float64"):
 
 def text_of(function, constants=None, bindings=None, real="float64"):
     constants, bindings = constants or {}, bindings or {}
-    types = types_of(function, real) + (REALS[real],) * len(Native(function, constants, bindings, real).numbers)
+    types = types_of(function, real) + (REALS[real],) * len(Native(function, constants, bindings, real).numbers())
     return module_of(function, constants, bindings, real, types)[0].text()
 
 

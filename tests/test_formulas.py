@@ -12,6 +12,7 @@ from distfsi.device.emit import plain
 from distfsi.fluid.formulas import limiters
 from distfsi.fluid.formulas import riemann as riemann_solvers
 from distfsi.fluid.formulas import six_equation as two_phase
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene import thermodynamics
 from fluids import AIR, MATERIALS, PAIRS, TNT, TRACE, WATER, model_of
 
@@ -378,7 +379,7 @@ def test_a_uniform_state_stays_to_the_bit(fluid, dimensions):
 @pytest.mark.parametrize(("fluid", "dimensions"), CASES)
 def test_a_stage_changes_conserved_values_by_its_fluxes_and_forces(fluid, dimensions):
     gravity = (1.5, -2.5, 3.5)[:dimensions]
-    model = model_of(*fluid, dimensions=dimensions, gravity=gravity)
+    model = model_of(*fluid, dimensions=dimensions, sources=(Gravity(gravity),))
     updated, phases = model.formula("updated"), len(fluid)
 
     @some

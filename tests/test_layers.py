@@ -18,7 +18,7 @@ LAYERS = (
     {"resources"},
     {"run"},
     {"simulation", "direct"},
-    {"diagnostics"},
+    {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},

@@ -263,7 +263,7 @@ def test_info_tells_what_a_folder_holds(space, capsys):
 def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
     scene = load(ROOT / "inputs" / "sod.toml")
     try:
-        with Journal(tmp_path, scene, Communicator(), 3):
+        with Journal(tmp_path, scene, Communicator(), 3, {"stage": 3.0004, "output": 1.0}):
             assert read_journal(tmp_path)["status"] == "running"
             assert "still running" in describe(tmp_path)
             if error:
@@ -273,5 +273,7 @@ def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
     notes = json.loads((tmp_path / "run.json").read_text())
     assert (notes["status"], notes["title"], notes["threads per rank"]) == (status, scene.title, 3)
     assert told in describe(tmp_path)
+    assert notes["seconds by part"] == {"stage": 3.0, "output": 1.0}
+    assert "time in    stage 75 %, output 25 %" in describe(tmp_path)
     if error:
         assert f"because    {notes['message'].splitlines()[0]}" in describe(tmp_path)

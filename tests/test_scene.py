@@ -17,6 +17,7 @@ from distfsi.laws.solid.scatter import Scatter
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.laws.solid.strength.linear_hardening import LinearHardening
 from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene import load, schema
 from distfsi.scene.description import Ball
 from distfsi.scene.reference import markdown
@@ -102,7 +103,7 @@ strength = { kind = "elastic", shear_modulus = "1 GPa" }
 """
     (tmp_path / "ball.toml").write_text(text)
     scene = load(tmp_path / "ball.toml")
-    assert (scene.domain.dimensions, scene.gravity, scene.title) == (3, (0.0, 0.0, -9.81), "ball")
+    assert (scene.domain.dimensions, scene.sources, scene.title) == (3, (Gravity((0.0, 0.0, -9.81)),), "ball")
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((64, 32, 32), (64, 8, 8))
     assert scene.fluid.inflow == ((None, None),) * 3
     assert scene.solid.bodies[0].velocity == (0.0, 0.0, 0.0)
@@ -251,7 +252,18 @@ def words(kind):
 def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     sections = ", ".join(
         f"'{name}'"
-        for name in ("title", "domain", "time", "fluid", "solid", "output", "gauges", "coupling", "performance")
+        for name in (
+            "title",
+            "domain",
+            "time",
+            "fluid",
+            "solid",
+            "sources",
+            "output",
+            "gauges",
+            "coupling",
+            "performance",
+        )
     )
     assert faults(BROKEN) == [
         f"titel (line 1): unknown key; expected one of {sections}; did you mean 'title'?",

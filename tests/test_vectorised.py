@@ -9,9 +9,8 @@ import pytest
 from llvmlite.binding import get_host_cpu_features
 from numba import typeof
 
-from distfsi.coupling.cut_cells.kernels import forces as cut_forces
-from distfsi.coupling.cut_cells.kernels import wall_distance
-from distfsi.coupling.kernels import spreading as push
+from distfsi.coupling.cut_cells.kernels import forces, nodal_distance
+from distfsi.coupling.kernels import spreading
 from distfsi.device import llvm_text
 from distfsi.device.fold import parameters_of
 from distfsi.device.native import Native
@@ -67,7 +66,7 @@ def native_row(row, scene):
 
 def machine_code(native, arguments):
     """What numba makes of a driver for such arguments."""
-    numbers = native.numbers
+    numbers = native.numbers()
     native.dispatcher.compile(tuple(map(typeof, [*arguments, *numbers])))
     return "\n".join(native.dispatcher.inspect_asm().values())
 
@@ -108,39 +107,29 @@ def test_without_the_promise_of_no_alias_rows_are_scalar(row, monkeypatch, tmp_p
     assert count(code, "mul", "pd", WIDE) == 0
 
 
-POINTS = (wall_distance.add_balls, cut_forces.see_particles, push.gather_kicks)
-INTEGERS = (
-    "order",
-    "start",
-    "low",
-    "window",
-    "strides",
-    "chosen",
-    "band",
-    "walled",
-    "shape",
-    "cells",
-    "home",
-    "grid_cells",
-)
-PAIRS = ("seen_cells", "origin", "extent")  # of integers
-TABLES = ("position", "ball", "mean", "image", "gained")
+POINTS = (nodal_distance.add_spheres, forces.interpolate, spreading.spread)
+INTEGERS = ("order", "start", "low", "window", "strides", "chosen", "band", "walled", "home")
+INTEGERS += ("shape", "steps", "cells", "origin", "extent", "seen")
+TABLES = ("position", "values", "mean", "image", "gained", "origin", "extent", "seen")
 COUNTS, AMOUNTS = ("begin", "end", "width", "giver"), ("size", "radius", "largest", "reach")
 
 
 def example(name):
-    """An argument of the type that a driver has under this name."""
-    if name in COUNTS or name in AMOUNTS:
-        return 0 if name in COUNTS else 1.0
+    """An argument of the type that a driver has under this name; fields of records by their last word."""
+    if name in COUNTS:
+        return 0
+    *_, word = name.split("_")
+    if word in AMOUNTS:
+        return 1.0
     if name == "kind":
         return np.zeros(1, np.int8)
-    dimensions = 5 if name == "kick" else 2 if name in TABLES + PAIRS else 1
-    return np.zeros((1,) * dimensions, np.int64 if name in INTEGERS + PAIRS else float)
+    dimensions = 5 if name == "field" else 2 if word in TABLES else 1
+    return np.zeros((1,) * dimensions, np.int64 if word in INTEGERS else float)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("driver", POINTS, ids=lambda driver: driver.__name__)
 def test_points_near_each_other_are_packed(driver):
     """What a particle is to LANES points is computed at once: in the driver, where its rows know how many there are."""
-    native = Native(driver, {"DIMENSIONS": 3, "LANES": 8, "KICKS": 4}, {}, "float64")
+    native = Native(driver, {"DIMENSIONS": 3, "LANES": 8, "GHOSTS": 2, "TRANSFERRED": 4}, {}, "float64")
     assert count(machine_code(native, [*map(example, parameters_of(driver, 0))]), "mul", "pd", WIDE) >= 5

@@ -55,19 +55,19 @@ class Team:
         team.seconds = 0.0
         return team
 
-    def run(self, function: Callable, count: int, *arguments) -> None:
-        """Call `function(begin, end, *arguments)` on ranges that together cover 0 … count."""
+    def run(self, kernel: Callable, count: int, *arguments) -> None:
+        """Call `kernel(begin, end, *arguments)` on ranges that together cover 0 … count."""
         started = clock.perf_counter()
-        self._share(function, count, *arguments)
+        self._share(kernel, count, *arguments)
         self.seconds += clock.perf_counter() - started
 
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
         return wanted
 
-    def run_few(self, function: Callable, count: int, *arguments) -> None:
-        """Call `function(0, count, *arguments)` on this thread."""
+    def run_few(self, kernel: Callable, count: int, *arguments) -> None:
+        """Call `kernel(0, count, *arguments)` on this thread."""
         if count:
-            function(0, count, *arguments)
+            kernel(0, count, *arguments)
 
     def array(self, host: np.ndarray) -> np.ndarray:
         return host
@@ -102,6 +102,12 @@ class Team:
 
     def finish_asynchronous(self) -> None:
         pass
+
+    def mark(self) -> float:
+        return clock.perf_counter()
+
+    def seconds_between(self, first: float, then: float) -> float:
+        return then - first
 
     def _share(self, function: Callable, count: int, *arguments) -> None:
         if self._pool is None or count < 2:

@@ -20,6 +20,7 @@ import numpy as np
 from distfsi.device.emit import Emission, callees_first, number_names
 from distfsi.device.exponential import EXPONENTIALS
 from distfsi.device.fold import Bound, Callee, NotInSubset, Source, parameters_of
+from distfsi.formulas.subset import Varying
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<",
@@ -131,7 +132,9 @@ def formulas_by_hand(
     return emission, {n: emission.add(bindings[n].function, bindings[n], "__" + n) for n in names}
 
 
-def numbers_of(driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> tuple[float, ...]:
+def numbers_of(
+    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]
+) -> tuple[float | Varying, ...]:
     """What the scene measures, in the order in which the driver's kernel gets it. Raises NotInSubset."""
     if hasattr(driver, "__by_hand__"):
         emission, _ = formulas_by_hand(driver, constants, bindings)

@@ -18,6 +18,7 @@ from distfsi.device.fold import (
     NUMBERS,
     Bound,
     Callee,
+    Changing,
     Fold,
     NotInSubset,
     Number,
@@ -27,20 +28,39 @@ from distfsi.device.fold import (
     is_fixed,
     literal,
 )
+from distfsi.formulas.subset import Varying
 
 
 class _Numbered(ast.NodeTransformer):
-    """Each Number becomes an item of the tuple of numbers."""
+    """Each Number, changing or not, becomes an item of the tuple of numbers."""
 
-    def __init__(self, numbers: dict[str, float]):
+    def __init__(self, numbers: dict[str, float | Varying]):
         self.numbers, self.places, self.found = numbers, list(numbers), False
 
-    def visit_Number(self, node: Number) -> ast.expr:
+    def visit_Number(self, node: Number | Changing) -> ast.expr:
         self.found = True
         if node.id not in self.numbers:
             self.numbers[node.id] = node.value
             self.places.append(node.id)
         return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
+
+    visit_Changing = visit_Number
+
+
+class Numbers:
+    """What a scene measures, as a kernel gets it behind its other arguments: called, it gives the values of now."""
+
+    def __init__(self, numbers: Iterable[float | Varying], real: Callable[[float], float]):
+        self._numbers, self._real = tuple(numbers), real
+        self._varies = any(isinstance(number, Varying) for number in self._numbers)
+        self._values = self._now()
+
+    def __call__(self) -> tuple[float, ...]:
+        return self._now() if self._varies else self._values
+
+    def _now(self) -> tuple[float, ...]:
+        values = (number.value if isinstance(number, Varying) else number for number in self._numbers)
+        return tuple(map(self._real, values))
 
 
 @dataclass
@@ -53,7 +73,7 @@ class Emission:
     constants: Mapping[str, object]
     bindings: Mapping[str, Bound]
     functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
-    numbers: dict[str, float] = field(default_factory=dict)
+    numbers: dict[str, float | Varying] = field(default_factory=dict)
     _callees: dict[tuple[Callable, str], Callee] = field(default_factory=dict)
 
     def add(self, function: Callable, scope: Bound | None = None, suffix: str = "") -> Callee:
@@ -160,5 +180,5 @@ def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping
     namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
     for _, tree in callees_first(emission.functions):
         exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)
-    formula, numbers = namespace[name], tuple(emission.numbers.values())
-    return (lambda *arguments: formula(*arguments, *numbers)) if numbers else formula
+    formula, numbers = namespace[name], Numbers(emission.numbers.values(), float)
+    return (lambda *arguments: formula(*arguments, *numbers())) if emission.numbers else formula

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import CodeType
 
 from distfsi.device.fold import Bound, Source, fields_of, is_record
+from distfsi.formulas.subset import Varying
 
 WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone
 
@@ -59,6 +60,8 @@ def _shape(value: object) -> str:
     """What a text depends on of a constant that a scene gives."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_shape, value))})"
+    if isinstance(value, Varying):
+        return "a changing number"
     return "a number" if isinstance(value, float) and value != 0.0 else repr(value)
 
 

@@ -3,7 +3,8 @@
 The result is a plain `ast.FunctionDef` in which branches on what the scene fixes are resolved, `static_range` loops are
 unrolled and arithmetic with 0 and 1 has vanished. Whole numbers and truth values of a scene are literals. What a scene
 measures, its floats, are not: each becomes a `Number`, a place for a value that a kernel gets at run time, and so does
-arithmetic among them; only a 0.0 is folded, as what a scene does not use it does not compute. Records (named tuples and
+arithmetic among them; only a 0.0 is folded, as what a scene does not use it does not compute. Of a `Varying` one the
+kernel gets the value of the moment. Records (named tuples and
 laws, the types of parameters) are flattened to a parameter per field. Anything outside the subset is refused with the
 module and line it stands on.
 """
@@ -20,6 +21,8 @@ from dataclasses import dataclass, field, is_dataclass
 from dataclasses import fields as dataclass_fields
 from functools import cache
 from typing import get_type_hints
+
+from distfsi.formulas.subset import Varying
 
 NUMBERS = "numbers_"  # the tuple in which functions hand on what a scene measures
 MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
@@ -202,6 +205,14 @@ class Number(ast.Name):
         self.value = value
 
 
+class Changing(ast.Name):
+    """A number of a scene that changes from call to call: arithmetic with it is the kernel's."""
+
+    def __init__(self, id: str = "", value: Varying | None = None):
+        super().__init__(id, ast.Load())
+        self.value = value
+
+
 def literal(value: object) -> ast.expr:
     """The tree of a constant: a number, a truth value or a tuple of them."""
     if isinstance(value, tuple):
@@ -213,20 +224,22 @@ def given(value: object, label: str) -> ast.expr:
     """The tree of a constant that a scene gives, in which floats other than 0.0 are Numbers of that label."""
     if isinstance(value, tuple):
         return ast.Tuple([given(item, f"{label}[{k}]") for k, item in enumerate(value)], ast.Load())
+    if isinstance(value, Varying):
+        return Changing(f"given[{label!r}]", value)
     is_number = isinstance(value, float) and value != 0.0
     return Number(f"given[{label!r}]", float(value)) if is_number else ast.Constant(value)
 
 
-def given_floats(constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> dict[str, float]:
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> dict[str, float | Varying]:
     """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
-    found: dict[str, float] = {}
+    found: dict[str, float | Varying] = {}
 
     def put(value: object, label: str) -> None:
         if isinstance(value, tuple):
             for k, item in enumerate(value):
                 put(item, f"{label}[{k}]")
-        elif isinstance(value, float):
-            found[label] = float(value)
+        elif isinstance(value, (float, Varying)):
+            found[label] = value
 
     for name, value in constants.items():
         put(value, name)
@@ -237,10 +250,10 @@ def given_floats(constants: Mapping[str, object], bindings: Mapping[str, Bound])
 
 
 def is_fixed(node: ast.expr) -> bool:
-    """Whether a tree is a constant, a Number, or a tuple of such: the same in every call."""
+    """Whether a tree is a constant, a number of the scene, or a tuple of such: the same wherever it stands."""
     if isinstance(node, ast.Tuple):
         return all(map(is_fixed, node.elts))
-    return isinstance(node, (ast.Constant, Number))
+    return isinstance(node, (ast.Constant, Number, Changing))
 
 
 def truth_of(node: ast.expr) -> tuple[bool, object]:

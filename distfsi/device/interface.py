@@ -82,6 +82,12 @@ class Device(Protocol):
     def finish_asynchronous(self) -> None:
         """Wait until all asynchronous work is done."""
 
+    def mark(self) -> Any:
+        """The moment when all that was asked for before is done, but for asynchronous work that is not joined."""
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        """Between two such moments; waits for them."""
+
 
 class DualArray:
     """An array of the device and, when it is looked at, its copy on the host."""

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, numbers_of, text_by_hand
+from distfsi.device.emit import Numbers
 from distfsi.device.fold import Bound, flat_values, parameters_of
 from distfsi.device.markers import ByHand
 
@@ -40,13 +41,13 @@ class Kernel:
         return self.driver.__name__
 
     @cached_property
-    def numbers(self) -> tuple[np.floating, ...]:
+    def numbers(self) -> Numbers:
         """What the scene measures: a kernel gets it behind its other arguments."""
-        return tuple(map(np.dtype(self.real).type, numbers_of(self.driver, self.constants, self.bindings)))
+        return Numbers(numbers_of(self.driver, self.constants, self.bindings), np.dtype(self.real).type)
 
     def given(self, arguments: Iterable[object]) -> list[object]:
         """What the kernel is called with: the arguments (without begin and end), records flattened, and the numbers."""
-        return [*flat_values(arguments), *self.numbers]
+        return [*flat_values(arguments), *self.numbers()]
 
     def text(self, arguments: Sequence[object]) -> str:
         """The CUDA C for arguments like those that are `given`. Raises NotInSubset."""

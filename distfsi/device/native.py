@@ -12,7 +12,7 @@ import importlib.util
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.cache import cache_directory, file_name, locked, write_whole
-from distfsi.device.emit import Emission, callees_first
+from distfsi.device.emit import Emission, Numbers, callees_first
 from distfsi.device.fingerprint import fingerprint, texts_depend_on
-from distfsi.device.fold import Bound, flat_values, given_floats
+from distfsi.device.fold import Bound, flat_values, given_numbers
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
 from distfsi.narrowing import present
@@ -66,42 +66,45 @@ class Native:
         self, driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
     ):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
-        self._numbers: tuple[np.floating, ...] = ()
-        self._call: Callable[..., Any] = self._first_call
+        self._compiled = False
         self._lock = threading.Lock()
 
     def __call__(self, *arguments: Any) -> Any:
         """Raises NotInSubset, and TypeError for what no kernel takes."""
-        return self._call(*flat_values(arguments), *self._numbers)
+        if not self._compiled:
+            self._compile(arguments)
+        return self.dispatcher(*flat_values(arguments), *self.numbers())
 
-    def _first_call(self, *arguments: Any) -> Any:
-        """One process of a machine at a time compiles a driver: others then find it on disk."""
-        with self._lock:
-            if self._call == self._first_call:
-                module = self.module
-                self._numbers = self.numbers
-                with locked(_path(module.__name__.rpartition(".")[2])):
-                    result = self.dispatcher(*arguments, *self._numbers)
-                self._call = self.dispatcher
-                return result
-        return self.dispatcher(*arguments, *self._numbers)
+    def _compile(self, arguments: Sequence[Any]) -> None:
+        """For the types of these; one process of a machine at a time, so that others find it on disk."""
+        with self._lock, locked(_path(self.name)):
+            if not self._compiled:
+                values = [*flat_values(arguments), *self.numbers()]
+                self.dispatcher.compile(tuple(map(self.dispatcher.typeof_pyval, values)))
+                self._compiled = True
 
-    @property
+    @cached_property
     def dispatcher(self) -> Any:
         """numba's."""
         return getattr(self.module, self.driver.__name__)
 
-    @property
-    def numbers(self) -> tuple[np.floating, ...]:
+    @cached_property
+    def numbers(self) -> Numbers:
         """What the scene measures, as the driver gets it."""
-        values, real = {"given": given_floats(self.constants, self.bindings)}, np.dtype(self.real).type
-        return tuple(real(eval(expression, values)) for expression in self.module.NUMBERS)
+        values = {"given": given_numbers(self.constants, self.bindings)}
+        return Numbers((eval(expression, values) for expression in self.module.NUMBERS), np.dtype(self.real).type)
 
     @cached_property
     def module(self) -> ModuleType:
-        """The driver's module. Its text is found without folding where it was made before."""
+        """The driver's module."""
         from distfsi.device import runtime
 
+        runtime.WRITERS[self.name] = self.body
+        return _loaded(self.name)
+
+    @cached_property
+    def name(self) -> str:
+        """The name of the driver's module, which is on disk. It is found without folding where it was made before."""
         key = fingerprint(self.driver, self.constants, self.bindings, self.real)
         known = cache_directory() / f"{self.driver.__name__}_{key}.name"
         name = known.read_text() if known.exists() else ""
@@ -109,15 +112,14 @@ class Native:
             name, text = self._module_text()
             write_whole(_path(name), text.encode())
             write_whole(known, name.encode())
-        runtime.WRITERS[name] = self.body
-        return _loaded(name)
+        return name
 
     def body(self, types: tuple[Type, ...]) -> tuple[str, str, Type | None]:
         """For arguments of such types the name of the driver's body, the LLVM IR that defines it, and the type that it
         returns."""
         compilation.begin()
         module, driver = module_of(self.driver, self.constants, self.bindings, self.real, types)
-        name = f"{self.module.__name__}.{compilation.made}"  # no other in this process has it
+        name = f"{self.name}.{compilation.made}"  # no other in this process has it
         own = re.compile(rf"^define internal (.*)@{re.escape(driver.name)}\(", re.MULTILINE)
         return name, own.sub(rf"define linkonce_odr \1@{name}(", module.text()), driver.returns
 

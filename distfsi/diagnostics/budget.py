@@ -82,8 +82,9 @@ class Budget:
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
         book("left", left)
         if self.coupling:
-            parts = self.solid.sub_steps
-            values |= {"sub-steps": parts, "sub-steps limited by": simulation.name_solid_limit() if parts > 1 else ""}
+            step = simulation.last_step
+            limit = step.name_particle(simulation.communicator) if step.sub_steps > 1 else ""
+            values |= {"sub-steps": step.sub_steps, "sub-steps limited by": limit}
             values |= {f"trapped {n}": m for n, m in zip(self.conserved, self.coupling.trapped(), strict=False)}
             for cause, amounts in self.coupling.ledger().items():
                 book(f"ledger {cause}", amounts, -1.0)

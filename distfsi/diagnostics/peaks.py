@@ -6,7 +6,7 @@ from math import prod
 
 import numpy as np
 
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.protocol import Coupling
 from distfsi.device.interface import DualArray
 from distfsi.diagnostics.kernels import peaks as kernels
 from distfsi.fluid.fluid import Fluid

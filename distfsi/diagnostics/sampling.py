@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
 from distfsi.coupling.kernels.cells import COVERED
+from distfsi.coupling.protocol import Coupling
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.regions import source_cell
 

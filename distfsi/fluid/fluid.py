@@ -47,7 +47,8 @@ class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step. stages: those that make a step.
+    step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
+    cells; of the others.
     """
 
     def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
@@ -67,13 +68,13 @@ class Fluid:
         self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
-        self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
+        self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._stages, self._calm = team.array(self.rest.stages), team.array(self.rest.calm)
         self._extent = team.array(blocks.extent)
         self._fastest = DualArray(team, np.zeros(blocks.local_count))
         self._before = self._accounted()
         self._signal: float | None = None
-        self.volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
+        self._volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
@@ -112,6 +113,16 @@ class Fluid:
         """Where a stage leaves its state; asked before the stage."""
         return self._buffers[_output(stage.number)].device
 
+    def average_sources(self, start: float, dt: float) -> None:
+        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
+        if self.model.body_force.average_over(start, dt):
+            self.rest.wake()
+
+    def set_volumes(self, volumes: DualArray) -> None:
+        """From now on fluid fills cells in part: by the first of the fields (local blocks, fields, Z, Y, X), which who
+        gives them changes between stages. By default all cells are whole."""
+        self._volumes = volumes
+
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
         self._before = self._accounted()
@@ -136,19 +147,22 @@ class Fluid:
         """Copies of what has left through the domain's sides, and of the number of limited faces."""
         return self.tiling.through.host().copy(), self.tiling.limited.host().copy()
 
+    def start_exchange(self, stage: Stage) -> None:
+        """Start to fill the ghost cells of the stage's input; `exchange.finish` ends it."""
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.start_exchange(stage)
         self.exchange.finish()
 
-    def advance_stage(self, stage: Stage, dt: float) -> None:
-        """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
+    def begin_stage(self) -> None:
+        """Find out which tiles are at rest."""
         self.rest.begin_stage()
         self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
-        self.advance_tiles(self._ready_tiles, stage, dt)
-        self.exchange.finish()
-        self.advance_tiles(self._waiting_tiles, stage, dt)
+
+    def end_stage(self, stage: Stage) -> None:
+        """After all tiles were advanced; after the last stage the state is that of the new time."""
         self.rest.stages = self.team.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
@@ -161,7 +175,7 @@ class Fluid:
         tiles = tiles[~self.rest.calm[tiles] | self.tiling.touches_side[tiles]]
         output = self._buffers[_output(stage.number)]
         real = output.dtype.type
-        states = States(self._buffers[0].device, self.input_of(stage), output.device, self.volumes.device)
+        states = States(self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device)
         step = StageStep(real(stage.b), real(dt), stage.weight, *self.rates(dt))
         given = self.tiling.arguments(self._calm, self._stages)
         chosen = self.team.array(tiles)

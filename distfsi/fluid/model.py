@@ -15,6 +15,7 @@ from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
+from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
 from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, Scene
@@ -43,6 +44,7 @@ class FluidModel:
     bindings: dict[str, Bound]
     eos: tuple[FluidEos, ...]
     dimensions: int
+    body_force: BodyForce
 
     @property
     def phases(self) -> int:
@@ -81,12 +83,13 @@ def fluid_model(scene: Scene) -> FluidModel:
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     asymmetric = reconstructed is reconstruction.weno5
+    body_force = BodyForce(scene.sources, dimensions)
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
         "FLUXES": variables + more_fluxes,
-        "GRAVITY": scene.gravity,
+        "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
@@ -113,7 +116,7 @@ def fluid_model(scene: Scene) -> FluidModel:
     for k, phase in enumerate(fluid.phases, 1):
         bindings |= {f"{name}_{k}": Bound.of(phase.eos, name, f"phase {k}") for name in ("reference", "grueneisen")}
         bindings[f"stored_reference_{k}"] = _stored_reference(fluid, k)
-    return FluidModel(constants, bindings, eos, dimensions)
+    return FluidModel(constants, bindings, eos, dimensions, body_force)
 
 
 def ghost_layers(scene: Scene) -> int:

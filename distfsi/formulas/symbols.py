@@ -23,9 +23,11 @@ def chosen(name: str, meaning: str):
 
 
 DIMENSIONS = Symbol("number of space dimensions, 1 to 3")
-LEAST_ALONE = Symbol("open part of a cell with which its fluid stands alone where it finds no neighbour to join")
+MINIMUM_ISOLATED = Symbol(
+    "minimum isolated volume fraction: with more a cell stands alone where it has no merge target"
+)
 LANES = Symbol("how many items of a list a thread of the device computes side by side")
-KICKS = Symbol("values that a cell gives to the particles around it, the velocity first")
+TRANSFERRED = Symbol("transfer components: values that a cell gives to the particles around it, the velocity first")
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 
@@ -34,7 +36,7 @@ VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the vol
 FLUXES = Symbol(
     "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
 )
-GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
+BODY_FORCE = Symbol("body force per mass, one component per dimension [m/s2], the mean over the step")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
 REST_DENSITY = Symbol("density at which energies that are counted from rest vanish with the pressure [kg/m3]")
 CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas, to the root of a quadratic")

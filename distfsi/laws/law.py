@@ -22,6 +22,7 @@ class Entry:
 
     meaning  in words
     unit     SI, "1" for a pure number; None: of what is no quantity, the type of the field says what it is
+    vector   whether it is one number per dimension
     limits   by name, "above", "at_least", "below", "at_most", in SI
     default  of the input, or NEEDED
     """
@@ -30,6 +31,7 @@ class Entry:
     unit: str | None
     limits: Mapping[str, float]
     default: object
+    vector: bool = False
 
 
 def quantity(unit: str, meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -40,6 +42,11 @@ def quantity(unit: str, meaning: str, *, default: object = NEEDED, **limits: flo
 def number(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     """A field that is a number without a unit."""
     return quantity("1", meaning, default=default, **limits)
+
+
+def vector(unit: str, meaning: str, *, default: object = NEEDED) -> Any:
+    """A field that has a number in this unit for each dimension."""
+    return field(metadata={"entry": Entry(meaning, unit, {}, default, vector=True)})
 
 
 def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -117,3 +124,19 @@ class Failure(Law):
     """What breaks a solid."""
 
     folder = "solid/failure"
+
+
+class Source(Law):
+    """What accelerates everything alike: `acceleration` [m/s2], one component per dimension, times a share of it that
+    may depend on time. A step takes the mean over itself, so that a free body gains the integral to round-off.
+
+    steady  whether the share is the same at all times
+    """
+
+    folder = "sources"
+    steady: ClassVar[bool] = False
+    acceleration: tuple[float, ...]
+
+    def share(self, start: float, end: float) -> float:
+        """The mean of the share over the time from `start` to `end` [s], which may be the same."""
+        raise NotImplementedError

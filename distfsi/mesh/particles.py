@@ -30,9 +30,7 @@ class ParticleExchange:
         particles."""
         self.blocks, self.device, self.kernels = blocks, device, kernels
         self.rows = Rows(device, kernels)
-        grid = blocks.grid
-        numbers = (grid.lower, grid.spacing, grid.cells, blocks.block_cells, blocks.curve_index)
-        self._grid = [device.array(np.array(values)) for values in numbers]
+        self._grid = blocks.grid_on(device), blocks.table_on(device)
         self._owners = device.array(blocks.owners)
         self._key: Key | None = None
         self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -125,10 +123,9 @@ class ParticleExchange:
             return np.empty(0, dtype=np.int64)
         axes, places = (np.array([plane[k] for plane in planes], dtype) for k, dtype in ((0, np.int64), (1, float)))
         mark = self.device.empty(position.shape[0], np.int8)
-        self.device.run(
-            self.kernels.find_border, position.shape[0], position, reach, image_reach, self.device.array(axes),
-            self.device.array(places), *self._grid, self._owners, communicator.rank, mark,
-        )  # fmt: skip
+        mirrors = (self.device.array(axes), self.device.array(places))
+        given = (position, reach, image_reach, *mirrors, *self._grid, self._owners, communicator.rank, mark)
+        self.device.run(self.kernels.find_border, position.shape[0], *given)
         return self.device.download(self.rows.marked(mark)[1])
 
     def _mirrored(

@@ -74,10 +74,8 @@ class Rows:
         width = int(np.prod(shape[1:]))
         taken, own = self.device.empty(shape, values.dtype), values.shape[0]
         others = self.device.empty(0, values.dtype) if others is None else others
-        self.device.run(
-            self._kernels.take_rows, shape[0], rows, own, width, values.reshape(-1), others.reshape(-1),
-            taken.reshape(-1),
-        )  # fmt: skip
+        flat = (values.reshape(-1), others.reshape(-1), taken.reshape(-1))
+        self.device.run(self._kernels.take_rows, shape[0], rows, own, width, *flat)
         return taken
 
 

@@ -13,7 +13,6 @@ import platform
 import sys
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +27,11 @@ from distfsi.narrowing import present
 from distfsi.resources.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLID_SIZES, SOLIDS
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
+from distfsi.step import COUPLING_PARTS
 
 REPEATS = 5
 RIPPLE = 1e-4  # relative
 SHEAR_RATE = 10.0  # 1/s
-CALLS_OF_COUPLING = ("time_step", "update_geometry", "before_stage", "after_stage", "transfer_impulse", "account_work")
 
 Result = dict[str, float]
 
@@ -103,31 +102,14 @@ def stir(fluid: Fluid) -> None:
     cells[:, : fluid.model.conserved] *= (1.0 + 1e-6 * noise).astype(cells.dtype)
 
 
-@dataclass
-class Stopwatch:
-    """Calls a function and adds up the time it takes [s]."""
-
-    function: Callable[..., Any]
-    seconds: float = 0.0
-
-    def __call__(self, *arguments: Any) -> Any:
-        started = clock.perf_counter()
-        result = self.function(*arguments)
-        self.seconds += clock.perf_counter() - started
-        return result
-
-
 def time_coupled_step(simulation: Simulation) -> tuple[float, float]:
-    """(wall, step) [s]: what all calls of the coupling take of the next step, and the step itself, on this rank."""
-    coupling = simulation.coupling
-    watches = {name: Stopwatch(getattr(coupling, name)) for name in CALLS_OF_COUPLING}
-    for name, watch in watches.items():
-        setattr(coupling, name, watch)
-    whole = Stopwatch(simulation.step)
-    whole()
-    for name in watches:
-        delattr(coupling, name)
-    return sum(watch.seconds for watch in watches.values()), whole.seconds
+    """(wall, step) [s]: what the coupling takes of the next step, and the step itself, on this rank."""
+    simulation.timers.lap()
+    started = clock.perf_counter()
+    simulation.step()
+    step = clock.perf_counter() - started
+    seconds = simulation.timers.lap()
+    return sum(seconds[part] for part in COUPLING_PARTS), step
 
 
 def time_parts(simulation: Simulation) -> Result:

@@ -107,7 +107,7 @@ def _endless(domain: scene.Domain, fluid: scene.Fluid | None, solid: scene.Solid
     D = domain.dimensions
     performance = scene.Performance(BLOCK_CELLS[D - 1], TILE_CELLS[D - 1])
     time, output = scene.Time(np.inf, 0.5, None), scene.Output("", 0.0, 1)
-    return scene.Scene("bench", domain, time, (0.0,) * D, fluid, solid, output, performance)
+    return scene.Scene("bench", domain, time, fluid, solid, output, performance)
 
 
 TWO_GASES = (HELIUM, AIR), (0.138, 1.0), (1.0, 2.0)

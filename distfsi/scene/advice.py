@@ -57,7 +57,7 @@ def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
 def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
-    if any(scene.gravity):
+    if scene.sources:
         return
     if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"
@@ -179,9 +179,9 @@ def _turns_around(scene: Scene, axis: int) -> bool:
 
 
 def _velocities(scene: Scene) -> list[tuple[float, ...]]:
-    """Velocities of the flow and of bodies, and gravity."""
+    """Velocities of the flow and of bodies, and accelerations."""
     flows = [state.velocity for state in states(scene.fluid)] if scene.fluid else []
-    return [*flows, *(body.velocity for body in _bodies(scene)), scene.gravity]
+    return [*flows, *(body.velocity for body in _bodies(scene)), *(source.acceleration for source in scene.sources)]
 
 
 def _shapes(scene: Scene) -> list[Shape]:

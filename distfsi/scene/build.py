@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from distfsi.laws.law import Source
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene import description, schema
 from distfsi.scene.description import (
     Body,
@@ -20,6 +22,7 @@ from distfsi.scene.description import (
     Solid,
     Time,
 )
+from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
@@ -149,6 +152,12 @@ def _gauge(name: str, given: GaugeInput, end: float, bodies: Sequence[str]) -> G
             return description.ParticleGauge(name, bodies.index(body), position, every or EACH_STEP)
         case schema.BodyGauge(body=body, every=every):
             return description.BodyGauge(name, bodies.index(body), every or EACH_STEP)
+
+
+def build_sources(gravity: tuple[float, ...] | None, given: Mapping[str, SourceInput]) -> tuple[Source, ...]:
+    """What accelerates everything: gravity, and the sources by name."""
+    everywhere = (Gravity(gravity),) if gravity and any(gravity) else ()
+    return (*everywhere, *(source.build() for source in given.values()))
 
 
 def build_coupling(given: CouplingInput) -> Coupling:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Strength
+from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -312,10 +312,10 @@ class Scene:
     title: str
     domain: Domain
     time: Time
-    gravity: tuple[float, ...]
     fluid: Fluid | None
     solid: Solid | None
     output: Output
     performance: Performance
     gauges: tuple[Gauge, ...] = ()
     coupling: Coupling = Coupling()
+    sources: tuple[Source, ...] = ()

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal, Union, cast, get_args, get_type_hint
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
-from distfsi.scene.values import Mirror, quantity
+from distfsi.narrowing import present
+from distfsi.scene.values import Mirror, quantity, vector
 
 LIMITS = {"above": "gt", "at_least": "ge", "below": "lt", "at_most": "le"}  # pydantic's words
 
@@ -37,12 +38,14 @@ def table_of(law: type[Law], key: str | None = None, word: str | None = None) ->
 
 def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
     """Type and description of one key."""
-    options = set(get_args(type_)) - {NoneType} or {type_}
+    options = {type_} if given.vector else set(get_args(type_)) - {NoneType} or {type_}
     kind: Any = next(iter(options))
     limits: dict[str, Any] = {LIMITS[name]: limit for name, limit in given.limits.items()}
     found: Any
     if is_dataclass(kind):
         found = table_of(cast(type[Law], kind))
+    elif given.vector:
+        found = vector(present(given.unit))
     elif given.unit is not None:
         found = quantity(given.unit, **limits)
     else:
@@ -64,6 +67,7 @@ def _word_as_table(value: Any) -> Any:
 PhaseInput = choice(FluidEos, "eos")
 SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
+SourceInput = choice(Source)
 _StrengthTable: Any = choice(Strength)
 StrengthInput = Annotated[
     _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])

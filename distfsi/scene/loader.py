@@ -80,7 +80,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         title=sections.title or stem,
         domain=domain,
         time=build.build_time(sections.time),
-        gravity=sections.domain.gravity or (0.0,) * dimensions,
+        sources=build.build_sources(sections.domain.gravity, sections.sources),
         fluid=fluid,
         solid=solid,
         output=build.build_output(sections.output, stem, fluid),

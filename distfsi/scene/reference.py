@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.loader import schema
 
@@ -50,6 +50,7 @@ SECTIONS = {
     "`strength` of a body": _names(Strength),
     "`failure` of a body": (*_names(Failure), "Scatter"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
+    "`[sources.NAME]`": _names(Source),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
     "`[gauges.NAME]`": ("PointGauge", "LineGauge", "PlaneGauge", "ParticleGauge", "BodyGauge"),

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.law_tables import FailureInput, PhaseInput, SolidEosInput, StrengthInput
+from distfsi.scene.law_tables import FailureInput, PhaseInput, SolidEosInput, SourceInput, StrengthInput
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
     Acceleration,
@@ -313,6 +313,7 @@ class Sections(Table):
     time: TimeInput | None = None
     fluid: FluidInput | None = None
     solid: SolidInput | None = None
+    sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     coupling: CouplingInput = CouplingInput()

@@ -127,7 +127,7 @@ def fastest_signal(scene: Scene, layout: Layout) -> float:
 def moving_share(scene: Scene, layout: Layout) -> float:
     """Share of the fluid's tiles that compute, as the mean over the time of the run: a tile of one state rests until
     the first wave comes."""
-    if any(scene.gravity):
+    if scene.sources:
         return 1.0
     speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
     speed = max(speeds) if speeds else max(_sound(scene.fluid, state) for state in states(scene.fluid))

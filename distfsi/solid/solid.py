@@ -15,6 +15,7 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.device.interface import Columns, Device, DualArray
 from distfsi.errors import Diverged
+from distfsi.laws.body_force import BodyForce
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels import particles as particle_kernels
@@ -31,6 +32,7 @@ from distfsi.solid.kernels import material, motion
 from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
 
@@ -63,6 +65,7 @@ class Solid:
     before   (own, D) [m/s] velocities then, on the device
     carried  (own, D) [m/s] mean velocity since then, on the device
     sub_steps  that have been made since then
+    body_force  that of the sources, over the sub-step
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
@@ -75,10 +78,11 @@ class Solid:
         axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
         self._vector = tuple((a,) for a in axes)
         self._components = self.dimensions * (self.dimensions + 1) // 2
+        self.body_force = BodyForce(scene.sources, self.dimensions)
         constants = {
             "DIMENSIONS": self.dimensions,
             "COMPONENTS": self._components,
-            "GRAVITY": tuple(map(float, scene.gravity)),
+            "BODY_FORCE": self.body_force.acceleration,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
             "SMOOTHING_RATIO": scene.solid.smoothing,
@@ -89,7 +93,7 @@ class Solid:
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, team, self.kernels)
         search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
-        self.form: UpdatedLagrangian | TotalLagrangian = UpdatedLagrangian(
+        self.form: SolidForm = UpdatedLagrangian(
             self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
         )
         if scene.solid.form == "total_lagrangian":
@@ -100,6 +104,7 @@ class Solid:
         self.work = np.zeros(blocks.local_count)
         self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
         self._home: DualArray | None = None
+        self._shown: list[str] = []
         self.sub_steps = 0
         self._own_particles(scene)
 
@@ -232,6 +237,13 @@ class Solid:
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
         self._groups = Groups(self.team, self.kernels, sizes, self._order)
 
+    def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
+        """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
+        into field files if it is `shown`."""
+        self.columns[name] = values
+        if shown:
+            self._shown.append(name)
+
     def _sorted(self, *names: str) -> dict[str, np.ndarray]:
         """The columns of these names by (block, body, id), an order that depends on nothing else."""
         return {name: self.columns[name][self._order] for name in names}
@@ -333,7 +345,7 @@ class Solid:
         c = {name: column[rows] for name, column in self.columns.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
         names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
-        names += [name for name in ("piece", "dust") if name in c]
+        names += [name for name in ("piece", *self._shown) if name in c]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant
 

@@ -65,7 +65,12 @@ class Material:
     @property
     def omega(self) -> float:
         """Grueneisen coefficient w: p depends on energy as w rho e."""
-        return self.eos.omega if isinstance(self.eos, Jwl) else self.eos.gamma - 1.0
+        match self.eos:
+            case IdealGas(gamma=gamma) | StiffenedGas(gamma=gamma):
+                return gamma - 1.0
+            case Jwl(omega=omega):
+                return omega
+        raise TypeError(f"no exact solution knows {self.eos}")
 
     @property
     def lowest_pressure(self) -> float:
@@ -83,6 +88,7 @@ class Material:
                 v = rho0 / density
                 a, b = A * np.exp(-R1 * v), B * np.exp(-R2 * v)
                 return a + b, (R1 * a + R2 * b) * v / density, (a / R1 + b / R2) / rho0
+        raise TypeError(f"no exact solution knows {self.eos}")
 
     def energy(self, density: Values, pressure: Values) -> Values:
         """Specific internal energy [J/kg]."""

@@ -30,7 +30,8 @@ from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.scene.description import Scene
 from distfsi.scene.shipped import shipped_inputs
-from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
+from distfsi.simulation import Simulation
+from distfsi.step import TimeStep, find_forces, make_step
 
 REALS = ("float64", "float32")
 INPUTS = shipped_inputs()
@@ -73,7 +74,7 @@ Calls = dict[tuple, Call]  # by driver and signature: a kernel, and arguments th
 
 def key_of(kernel: Kernel, arguments: Sequence[Any]) -> tuple:
     """What tells calls of one scene apart."""
-    return kernel.driver, kernel.signature(arguments)
+    return kernel.driver, kernel.signature(kernel.given(arguments))
 
 
 class Inventory(Gpu):
@@ -126,25 +127,22 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     simulation = Simulation.of(scene, communicator, device=gpu)
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
 
-    def time_step() -> tuple[float, int]:
-        if solid:
-            solid.time_step()
-        if coupling:
-            coupling.time_step()
+    with np.errstate(all="ignore"):
+        find_forces(solid, coupling, simulation.timers)
         if fluid:
             fluid.fastest_signal()
-        return TIME_STEP, 2
-
-    step = coupled_step if coupling else fluid_step if fluid else solid_step
-    with np.errstate(all="ignore"):
-        step(*simulation.parts, time_step)
+        for part in (solid, coupling):
+            if part:
+                part.time_step()
+        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, 2), simulation.timers)
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
-            coupling.absorb()
+            geometry, state = coupling.geometry, fluid.device_state
+            coupling.absorb(geometry.lists, geometry.walls)
             coupling.trapped()
-            coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
-            coupling.wall.add_balls(
+            coupling.drag(geometry, gpu.empty(1, np.int64), state, gpu.empty((solid.count, D)), TIME_STEP)
+            coupling.wall.add_spheres(
                 gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)
             )
         simulation.watch()
@@ -192,9 +190,10 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
         calls = [*gpu.calls.values()]
         calls += [(kernel, a) for kernel in others for _, a in known[precision(scene), kernel.driver].values()]
         for kernel, arguments in calls:
-            key = repr(kernel), kernel.signature(arguments)
-            text = written.get(key) or written.setdefault(key, kernel.text(arguments))
-            of = texts.setdefault(text, Text(kernel, arguments, scene.domain.dimensions, {}))
+            given = kernel.given(arguments)
+            key = repr(kernel), kernel.signature(given)
+            text = written.get(key) or written.setdefault(key, kernel.text(given))
+            of = texts.setdefault(text, Text(kernel, given, scene.domain.dimensions, {}))
             of.scenes[name] = None
     return texts
 

@@ -26,6 +26,7 @@ CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many par
 STEPS_BETWEEN_SAMPLES = 5
 CYLINDER_CELLS = (10, 20, 40)  # across the cylinder away from the floor
 FITTED_CELLS = 100  # around half of it
+QUICK_CELLS = 25  # the same of a quick look
 RAISED, RAISED_CELLS = 0.01, 50  # height above the floor of one that starts in gas, and cells around half of it
 
 
@@ -128,19 +129,19 @@ def draw(runs: Mapping[int, Tracks]) -> None:
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
-    """Coarse cells until the first time."""
+    """Coarse cells and fitted meshes until the first time."""
     until = f"time.end={LIFTOFF[0].time}"
-    _study(communicator, CELLS_ACROSS[:1], [until, *overrides])
-    _compare(communicator, CYLINDER_CELLS[:1], [until, *overrides])
+    _study(communicator, CELLS_ACROSS[:1], [until, *overrides], QUICK_CELLS)
+    _compare(communicator, CYLINDER_CELLS[:1], [until, *overrides], QUICK_CELLS)
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     """All resolutions; print the places of the centre, leave tracks, charts and fields in DIRECTORY."""
-    _study(communicator, CELLS_ACROSS, overrides)
-    _compare(communicator, CYLINDER_CELLS, overrides)
+    _study(communicator, CELLS_ACROSS, overrides, RAISED_CELLS)
+    _compare(communicator, CYLINDER_CELLS, overrides, FITTED_CELLS)
 
 
-def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
+def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str], fitted: int) -> None:
     runs = {cells: run(communicator, cells, overrides) for cells in sizes}
     raised = {cells: run_raised(communicator, cells, overrides) for cells in sizes[:2]}
     if communicator.rank > 0:
@@ -153,20 +154,20 @@ def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence
     for cells, tracks in runs.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"{'raised by ' + format(RAISED, 'g'):>24}")
-    print(row("fitted mesh", centres(lift_raised(runs[sizes[0]]["time"][-1]))))
+    print(row("fitted mesh", centres(lift_raised(runs[sizes[0]]["time"][-1], fitted))))
     for cells, tracks in raised.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"tracks, charts and fields in {DIRECTORY}", flush=True)
 
 
-def _compare(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
+def _compare(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str], fitted: int) -> None:
     """Print how far the cylinder has come away from the floor, and its velocity, at the times of the references."""
     for name, around in SURROUNDINGS.items():
         runs = {f"{n} cells across": throw(communicator, around, n, overrides) for n in sizes}
         if communicator.rank > 0:
             continue
         end = next(iter(runs.values()))["time"][-1]
-        runs = {"fitted mesh": flight(around, end), **runs}
+        runs = {"fitted mesh": flight(around, end, fitted), **runs}
         times = [r.time for r in LIFTOFF if r.time <= end * (1.0 + 1e-9)]
         print(f"{name + ': path, speed at':>24}" + "".join(f"   t = {time:<14g}" for time in times))
         for label, t in runs.items():

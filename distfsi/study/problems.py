@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -70,6 +70,11 @@ class Problem:
         return np.array([np.abs(a - b).mean() / np.abs(b).mean() for a, b in pairs])
 
 
+def _in_the_plane(source: Any) -> Any:
+    """A source of one dimension in two."""
+    return replace(source, acceleration=(*source.acceleration, 0.0))
+
+
 def in_rows(scene: Scene, rows: int) -> Scene:
     """A scene in one dimension as `rows` equal ones in two, periodic across."""
     domain, fluid = scene.domain, present(scene.fluid)
@@ -92,7 +97,7 @@ def in_rows(scene: Scene, rows: int) -> Scene:
     return replace(
         scene,
         domain=wide,
-        gravity=(*scene.gravity, 0.0),
+        sources=tuple(_in_the_plane(source) for source in scene.sources),
         fluid=replace(fluid, regions=regions, inflow=(*fluid.inflow, (None, None))),
         performance=Performance(BLOCK_CELLS[1], TILE_CELLS[1]),
     )

@@ -71,7 +71,7 @@ def scene_of(
     ]
     fluid = Fluid((Phase("fluid", eos),), tuple(states), "minmod", 1e-6, ((None, None),) * D, "float64")
     return Scene(
-        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), (0.0,) * D, fluid,
+        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), fluid,
         Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((CELLS,) * D, (CELLS,) * D),
         coupling=Coupling(scheme),
     )  # fmt: skip

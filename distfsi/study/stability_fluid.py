@@ -175,7 +175,7 @@ def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
         return Verdict(FAILED, _cause(error))
     if _swings(simulation, tube):
         return Verdict(SWUNG)
-    faces, redone = present(simulation.fluid).limited_faces(), simulation.rejected_steps
+    faces, redone = present(simulation.fluid).limited_faces(), present(simulation.fluid).rejected_steps
     return Verdict(HELPED, f"{faces} limited faces; {redone} redone steps") if faces or redone else Verdict(SURVIVED)
 
 

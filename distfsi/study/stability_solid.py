@@ -51,7 +51,7 @@ def scene_of(form: Form, bodies: Sequence[Body], size: float) -> Scene:
     """Bodies in a box that reaches `size` [m] to all sides."""
     lower, upper = (-size, -size), (size, size)
     return Scene(
-        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None), (0.0, 0.0),
+        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None),
         None, Solid(tuple(bodies), 1.3, 0.5, 1.0, **form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
     )  # fmt: skip
 

@@ -1,8 +1,8 @@
-"""What a moving wall does to a cell: the pressure on it, the content that fluxes and wall leave, mixed contents.
+"""What a moving wall does to a cell: the pressure on it, the content that fluxes and wall leave, and its state.
 
-The content of a cell is Q = v U, where v is the part of its volume that the fluid fills: not the geometric one but the
-one that the fluxes have swept, so that a uniform flow stays uniform. For two phases the energies of both belong to the
-content until they are relaxed.
+The conserved content of a cell is Q = v U, where v is its fluid volume fraction: not the geometric one but the one that
+the fluxes leave by the geometric conservation law, so that a uniform flow stays uniform. For two phases the energies of
+both belong to the content until they are relaxed.
 """
 
 from math import pow, sqrt
@@ -12,8 +12,8 @@ from distfsi.fluid.formulas.six_equation import phase_energies
 from distfsi.fluid.formulas.stiffness import exponent_1, weight_1
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     DIMENSIONS,
-    GRAVITY,
     MINIMUM_FRACTION,
     PHASES,
     VARIABLES,
@@ -78,16 +78,16 @@ def with_energies(U, volume):
         return (*(volume * U[v] for v in static_range(VARIABLES)), volume * e1, volume * e2)
 
 
-def stage_content(U_n, U, v_n, v, D, swept, b, dt):
+def stage_content(U_n, U, v_n, v, D, freed, b, dt):
     """Content after a stage of a cell that held U_n in v_n before the step and holds U in v now.
 
-    D: dt times the divergence of the fluxes through the open parts of its faces, the wall's included; swept: the part
+    D: dt times the divergence of the fluxes through the open parts of its faces, the wall's included; freed: the part
     of the cell that the wall has freed.
     """
     Q_n, Q = with_energies(U_n, v_n), with_energies(U, v)
     rho = sum(Q[k] for k in static_range(PHASES))
-    force = tuple(dt * (GRAVITY[d] * rho) for d in static_range(DIMENSIONS))
-    work = dt * sum(GRAVITY[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
+    force = tuple(dt * (BODY_FORCE[d] * rho) for d in static_range(DIMENSIONS))
+    work = dt * sum(BODY_FORCE[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
     E = PHASES + DIMENSIONS
     transported = (
         *(Q_n[k] + b * (Q[k] - D[k] - Q_n[k]) for k in static_range(PHASES)),
@@ -100,7 +100,7 @@ def stage_content(U_n, U, v_n, v, D, swept, b, dt):
     if PHASES == 1:
         return transported
     else:
-        growth_of_volume = D[VARIABLES + 2] + swept
+        growth_of_volume = D[VARIABLES + 2] + freed
         W = primitives(U)
         a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
         w1, w2 = a1 * p * growth_of_volume, (1.0 - a1) * p * growth_of_volume

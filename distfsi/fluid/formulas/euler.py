@@ -10,8 +10,8 @@ from distfsi.fluid.formulas.riemann import contact_speed
 from distfsi.fluid.formulas.stiffness import weight_1
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     DIMENSIONS,
-    GRAVITY,
     VARIABLES,
     bounding_speeds,
     contact_jump_diffusion,
@@ -110,11 +110,11 @@ def updated(U_n, U, W, D, b, dt):
     the bit.
     """
     rho = U[0]
-    work = sum(GRAVITY[d] * U[1 + d] for d in static_range(DIMENSIONS))
+    work = sum(BODY_FORCE[d] * U[1 + d] for d in static_range(DIMENSIONS))
     return (
         U_n[0] + b * (U[0] - D[0] - U_n[0]),
         *(
-            U_n[1 + d] + b * (U[1 + d] - D[1 + d] + dt * (GRAVITY[d] * rho) - U_n[1 + d])
+            U_n[1 + d] + b * (U[1 + d] - D[1 + d] + dt * (BODY_FORCE[d] * rho) - U_n[1 + d])
             for d in static_range(DIMENSIONS)
         ),
         U_n[1 + DIMENSIONS] + b * (U[1 + DIMENSIONS] - D[1 + DIMENSIONS] + dt * work - U_n[1 + DIMENSIONS]),

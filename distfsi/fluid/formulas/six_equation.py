@@ -12,10 +12,10 @@ from distfsi.fluid.formulas.riemann import contact_speed
 from distfsi.fluid.formulas.stiffness import weight_1, weight_2
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     CLOSED_FORM,
     DIMENSIONS,
     FLUXES,
-    GRAVITY,
     MINIMUM_FRACTION,
     VARIABLES,
     bounding_speeds,
@@ -194,12 +194,12 @@ def face_flux(left, right, jump):
 def updated_conserved(U_n, U, D, b, dt):
     """U_n + b (U - D + dt S - U_n) of masses, momentum and total energy; S is the body force and its work."""
     rho = U[0] + U[1]
-    work = sum(GRAVITY[d] * U[2 + d] for d in static_range(DIMENSIONS))
+    work = sum(BODY_FORCE[d] * U[2 + d] for d in static_range(DIMENSIONS))
     return (
         U_n[0] + b * (U[0] - D[0] - U_n[0]),
         U_n[1] + b * (U[1] - D[1] - U_n[1]),
         *(
-            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (GRAVITY[d] * rho) - U_n[2 + d])
+            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (BODY_FORCE[d] * rho) - U_n[2 + d])
             for d in static_range(DIMENSIONS)
         ),
         U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS]),
