@@ -105,7 +105,7 @@ def run(
     with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
-            simulation.asked, simulation.timers = requests.strongest, timers
+            simulation.requested, simulation.timers = requests.strongest, timers
             budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
             records = Records(simulation, budget, performance, files, origin)
             kept = simulation.kept() | {"budget": budget, "records": records}

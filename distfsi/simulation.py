@@ -16,8 +16,10 @@ from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
-from distfsi.diagnostics.gauges import Gauge, gauge_of
-from distfsi.diagnostics.peaks import Peaks, schlieren
+from distfsi.diagnostics.derived import DerivedFields
+from distfsi.diagnostics.gauges import GaugeRecorder
+from distfsi.diagnostics.peaks import Peaks
+from distfsi.diagnostics.schlieren import Schlieren
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
@@ -42,11 +44,12 @@ class Simulation:
     timers    count the parts of a step (distfsi/step.py)
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
+    derived   fields of the cells for the output files, beside those of the fluid
     last_step   the step made last
     limited_by  what set it, as far as is known without asking other ranks: with the cell or particle named last
     loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
               was dropped, and the solid goes on alone
-    asked     what this rank is asked for; looked at once in every step
+    requested     what this rank is asked for; looked at once in every step
     """
 
     scene: Scene
@@ -56,14 +59,15 @@ class Simulation:
     solid: Solid | None
     coupling: Coupling | None
     timers: Timers
-    watchers: list[Peaks | Gauge] = field(default_factory=list)
+    watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
+    derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
     limited_by: str = str(Reason.START)
     loaded: bool = False
     alone: bool = False
-    asked: Callable[[], Request] = lambda: Request.NOTHING
+    requested: Callable[[], Request] = lambda: Request.NOTHING
 
     @classmethod
     def of(
@@ -79,16 +83,20 @@ class Simulation:
         `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
         """
         blocks = deal_blocks(scene, communicator, costs)
-        team = device or Team(threads or threads_of_rank(communicator))
+        device = device or Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
-        solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
+        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
-        coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(team))
+        coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
         if scene.output.peaks:
-            simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
-        simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
+            peaks = Peaks(scene.output.peaks, fluid, coupling)
+            simulation.watchers.append(peaks)
+            simulation.derived.append(peaks)
+        if scene.output.schlieren:
+            simulation.derived.append(Schlieren(fluid))
+        simulation.watchers += [GaugeRecorder(name, gauge, simulation) for name, gauge in scene.gauges.items()]
         return simulation
 
     @property
@@ -124,7 +132,7 @@ class Simulation:
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
-        given = (self.time, self.scene.time, self.asked(), self.communicator, self.timers)
+        given = (self.time, self.scene.time, self.requested(), self.communicator, self.timers)
         with self.timers("time step"):
             return time_step(*self._active, *given)
 
@@ -207,11 +215,8 @@ class Simulation:
         """Collective. Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
-        for watcher in self.watchers:
-            if isinstance(watcher, Peaks):
-                cells |= watcher.outputs(covered)
-        if self.scene.output.schlieren:
-            cells["schlieren"] = schlieren(self.fluid, covered)
+        for derived in self.derived:
+            cells |= derived.outputs(covered)
         if self.solid is None:
             return cells, None
         self.solid.label_pieces()

@@ -103,8 +103,8 @@ def time_step(
     fluid_rate, solid_rate, wall_rate, strongest = communicator.maximum(rates)
     if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
         raise Diverged("there is no stable time step")
-    most = coupling.sub_steps if coupling else 1
-    rate_of = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / most}
+    maximum = coupling.sub_steps if coupling else 1
+    rate_of = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / maximum}
     reason = max(rate_of, key=rate_of.__getitem__)
     dt, left = 1.0 / rate_of[reason], limits.end - time
     if dt >= left:

@@ -70,7 +70,7 @@ def step(part, impulse=None):
     given = None if impulse is None else impulse(part.columns)
     part.advance(dt)
     if impulse is not None:
-        part.push(given)
+        part.apply_impulse(given)
     work = part.blocks.sum(part.work[:, None])[0]
     part.migrate()
     return dt, work

@@ -346,7 +346,7 @@ def test_bonds_that_fit_less_than_half_of_the_materials_volume_let_go(thickness,
     part = failed_block(COPPER_EOS)
     c = part.columns
     c["position"][:, 1] *= thickness  # and the density stays that of the reference state
-    c["loose"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
+    c["detaching"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
     lost = c["bond_count"].copy()
     for _ in range(2):
         part.prepare()
@@ -361,8 +361,8 @@ def test_a_spring_that_was_never_pressed_does_not_push():
     part = failed_block(COPPER_EOS)
     c = part.columns
     c["position"][:, 1] *= 0.55
-    c["around"] = np.ones(len(c["id"]))
-    c["loose"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
+    c["neighbourhood_damage"] = np.ones(len(c["id"]))
+    c["detaching"] = (c["reference"][:, 1] > 0.015).astype(np.int64)
     for _ in range(2):
         part.prepare()
     assert 0 < (c["bond_count"] == 0).sum() < len(c["id"])
@@ -372,14 +372,14 @@ def test_a_spring_that_was_never_pressed_does_not_push():
     assert np.abs(part._acceleration).max() > 0.0
 
 
-@pytest.mark.parametrize(("around", "pieces"), [(0.0, 1), (0.5, 2)])
-def test_an_opening_that_no_particle_sees_as_its_stretch_is_a_crack(around, pieces):
+@pytest.mark.parametrize(("neighbourhood_damage", "pieces"), [(0.0, 1), (0.5, 2)])
+def test_an_opening_that_no_particle_sees_as_its_stretch_is_a_crack(neighbourhood_damage, pieces):
     """Beside damaged particles: the ends need not be, where the failed ones between them have become debris."""
     part = failed_block(COPPER_EOS)
     c = part.columns
     c["damage"][:] = 0.0
     c["damage"][0] = 1.0  # elsewhere
-    c["around"][:] = around
+    c["neighbourhood_damage"][:] = neighbourhood_damage
     c["position"][:, 0] += np.where(c["reference"][:, 0] > 0.0, 2.5e-3, 0.0)
     part.prepare()
     found = part.pieces()["particles"]

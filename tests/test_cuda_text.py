@@ -21,16 +21,15 @@ from distfsi.coupling.kernels import spreading
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.solid.kernels import bonds, contact
-from distfsi.solid.kernels import pairs as solid
+from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs
 from launch import ROOT
 from side_by_side import SideBySide
 
 ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 # Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
-FAILING = ("crack", "cut", "look_around", "mark_damaged")
-NOT_REACHED = (*FAILING, "keep_fit", "mark_cut", "mark_debris", "open_voids", "place_among", "press")
-FORMS = {"updated_lagrangian": (solid,), "total_lagrangian": (bonds, contact)}
+FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_debris", "open_voids")
+NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "drop_tension")
+FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
 CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
 CUT_CELLS += (redistribution, spreading, volumes)
 SCHEMES = {"paper": (covering, spreading, states), "cut_cells": CUT_CELLS}
@@ -38,7 +37,7 @@ SCHEMES["stairs"] = SCHEMES["cut_cells"]
 OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"round_apertures", "round_fractions"}}
 OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
-ALWAYS |= {"find_neighbours", "push"}
+ALWAYS |= {"find_neighbours", "apply_impulse"}
 
 AIR = '{ eos = "ideal_gas", gamma = 1.4 }'
 TNT = '{ eos = "jwl", rho0 = 1630, A = 3.712e11, B = 3.21e9, R1 = 4.15, R2 = 0.95, omega = 0.3 }'

@@ -312,7 +312,7 @@ def test_a_free_plate_flies_as_the_simple_wave_says(thickness):
     velocity = case.solid.totals()["momentum"][0] - (case.simulation.time - 0.5) * impulse[0] / dt
     assert velocity == pytest.approx(0.3909302681, rel=5e-3)
     assert np.abs(case.balance() - before).max() < 1e-12
-    assert all(np.abs(made).max() < 1e-14 for made in case.coupling.ledger().values())
+    assert all(np.abs(made).max() < 1e-14 for made in case.coupling.budget_by_cause().values())
 
 
 @pytest.mark.parametrize(
@@ -330,7 +330,7 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
         case.step()
         assert case.solid.sub_steps > 1 or phases == AIR_AND_WATER
     assert np.abs(case.balance() - before).max() < 1e-12 * before.max()
-    assert all(np.abs(made).max() < 1e-13 for made in case.coupling.ledger().values())
+    assert all(np.abs(made).max() < 1e-13 for made in case.coupling.budget_by_cause().values())
 
 
 def test_stairs_push_a_plate_of_one_cell():
@@ -341,7 +341,7 @@ def test_stairs_push_a_plate_of_one_cell():
     for _ in range(12):
         dt, impulse = case.step()
     assert impulse[0] / dt > 5.0  # the pressures are 10 and 1 at the start
-    assert np.abs(case.coupling.ledger()["wall"]).max() < 1e-12
+    assert np.abs(case.coupling.budget_by_cause()["wall"]).max() < 1e-12
 
 
 def test_stairs_keep_uniform_flow_and_all_books():

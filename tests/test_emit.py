@@ -612,6 +612,30 @@ class Spring:
         return -self.stiffness * self.stretch(x) + HALF * self.rest
 
 
+class Softer(Spring):
+    """A law that has its fields and a formula from another one."""
+
+    def stretch(self, x):
+        return HALF * (x - self.rest)
+
+
+class Memory(NamedTuple):
+    """What a material remembers: the scene says what that is."""
+
+
+class Remembered(NamedTuple):
+    strain: np.ndarray
+    damage: np.ndarray
+
+
+@driver
+def remember(begin, end, memory: Memory):
+    for i in range(begin, end):
+        held = tuple(memory[k][i] for k in static_range(N))
+        for k in static_range(N):
+            memory[k][i] = held[k] + HALF * held[0]
+
+
 def arithmetic_of_numbers(x):
     return x * (1.0 / GAMMA) + (GAMMA - 1.0) * -GAMMA / 2.0
 
@@ -721,6 +745,12 @@ def test_a_record_has_all_fields_and_the_class_of_its_parameter(function, why):
         text_of(function)
 
 
+def test_the_scene_chooses_a_record_whose_fields_have_numbers():
+    memory = Remembered(np.array([1.0, 2.0]), np.array([10.0, 20.0]))
+    cpu.build([remember], {"N": 2}, {"Memory": Remembered}).remember(0, 2, memory)
+    assert (memory.strain.tolist(), memory.damage.tolist()) == ([1.5, 3.0], [10.5, 21.0])
+
+
 def springs(first, second):
     return {"first_material": Bound.of(first, "force"), "second_material": Bound.of(second, "force")}
 
@@ -741,6 +771,9 @@ def test_a_law_gives_its_formulas_its_numbers():
 
 def test_a_law_may_come_from_a_table():
     out = np.zeros(2)
+    twice = cpu.build([pull], {}, {"first_material": Bound.from_table(Softer, "force")})
+    twice.pull(0, 2, np.array([[2.0, 1.0], [5.0, 3.0]]), out)
+    assert out.tolist() == [Softer(2.0, 1.0).force(HALF), Softer(5.0, 3.0).force(HALF)]
     cpu.build([pull], {}, {"first_material": Bound(Spring.force)}).pull(0, 2, np.array([[2.0, 1.0], [5.0, 3.0]]), out)
     assert out.tolist() == [Spring(2.0, 1.0).force(HALF), Spring(5.0, 3.0).force(HALF)]
 

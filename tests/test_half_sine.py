@@ -72,7 +72,7 @@ def test_bodies_and_all_together_gain_what_is_free_gains(name, end, top):
         mass, total = solid["mass"], solid["momentum"][0]
         if fluid:
             held, left = fluid.totals(coupling.volume)[0], fluid.left_domain()
-            mass, total = mass + held[0], total + held[1] + left[1] - sum(coupling.ledger().values())[1]
+            mass, total = mass + held[0], total + held[1] + left[1] - sum(coupling.budget_by_cause().values())[1]
         return total, mass
 
     first, mass = momentum()

@@ -22,6 +22,7 @@ LAYERS = (
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},
+    {"gauges"},
     {"laws"},
     {"formulas"},
     {"errors", "narrowing", "__init__"},

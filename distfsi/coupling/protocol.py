@@ -32,7 +32,7 @@ class Coupling(Protocol):
     reach      [m]: how far the solid's ghosts and images must go
     sub_steps  how many sub-steps of the solid a step has at most
     stray      [m]: how far particles may go between two migrations, if there are sub-steps
-    causes     of what the coupling creates or takes, keys of ledger()
+    causes     of what the coupling creates or takes, keys of budget_by_cause()
     kind       field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
                coupling/kernels/cells.py
     """
@@ -80,7 +80,7 @@ class Coupling(Protocol):
     def trapped(self) -> np.ndarray:
         """Collective. Mass [kg] of each phase in cells that are shut: it neither flows nor pushes."""
 
-    def ledger(self) -> dict[str, np.ndarray]:
+    def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses [kg], momentum [N s] and energy [J] (conserved,) that the coupling has created since the
         start, per cause."""
 

@@ -46,7 +46,7 @@ TAKEN = frozenset(  # words of C++ and of device/runtime.h
     float friend goto inline int integer item length long mutable namespace new not operator or pack private protected
     public real register requires short signed sizeof static struct switch template this throw true try typedef typename
     union unsigned using virtual void volatile xor load store""".split()  # noqa: SIM905
-)
+) | {*WORDS.values()}
 
 
 @cache
@@ -129,7 +129,7 @@ def formulas_by_hand(
 ) -> tuple[Emission, dict[str, Callee]]:
     """The formulas that a hand-written kernel calls, as far as a scene binds them, by the names in which it does."""
     emission, names = Emission(constants, bindings), [n for n in driver.__by_hand__.formulas if n in bindings]
-    return emission, {n: emission.add(bindings[n].function, bindings[n], "__" + n) for n in names}
+    return emission, {n: emission.add_bound(n) for n in names}
 
 
 def numbers_of(

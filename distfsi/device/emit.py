@@ -71,22 +71,22 @@ class Emission:
     """
 
     constants: Mapping[str, object]
-    bindings: Mapping[str, Bound]
+    bindings: Mapping[str, Bound | type]
     functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
     numbers: dict[str, float | Varying] = field(default_factory=dict)
-    _callees: dict[tuple[Callable, str], Callee] = field(default_factory=dict)
+    _callees: dict[tuple[Callable, type | None, str], Callee] = field(default_factory=dict)
 
-    def add(self, function: Callable, scope: Bound | None = None, suffix: str = "") -> Callee:
-        """Fold `function` and all it calls, with the constants of `scope`."""
-        key = (function, suffix)
+    def add(self, function: Callable, scope: Bound | None = None, suffix: str = "", law: type | None = None) -> Callee:
+        """Fold `function`, perhaps a formula of a `law`, and all it calls, with the constants of `scope`."""
+        key = (function, law, suffix)
         if key in self._callees:
             return self._callees[key]
-        name = Source(function).name + suffix
+        source = Source(function, self._records() | ({"self": law} if law else {}))
+        name = source.name + suffix
         if name in self.functions:
-            raise NotInSubset(f"{Source(function).place}: {name} is also the name of {self.functions[name][0].place}")
-        source = Source(function)
+            raise NotInSubset(f"{source.place}: {name} is also the name of {self.functions[name][0].place}")
         self.functions[name] = source, ast.FunctionDef()  # its name is taken
-        lookup, call = (partial(find, function, scope, suffix) for find in (self._constant, self._callee))
+        lookup, call = (partial(find, source, scope, suffix) for find in (self._constant, self._callee))
         fold = Fold(source, lookup, call)
         tree = fold.run()
         tree.name, count = name, len(tree.args.args)
@@ -100,6 +100,15 @@ class Emission:
         self.functions[name] = source, ast.fix_missing_locations(tree)
         self._callees[key] = Callee(name, fold.parameters, count, takes_numbers, result)
         return self._callees[key]
+
+    def add_bound(self, name: str) -> Callee:
+        """Fold the formula that the scene binds to a name."""
+        bound = self.bindings[name]
+        return self.add(bound.function, bound, "__" + name, bound.law)
+
+    def _records(self) -> dict[str, type]:
+        """The records that the scene chooses."""
+        return {name: class_ for name, class_ in self.bindings.items() if isinstance(class_, type)}
 
     def root(self, function: Callable) -> str:
         """Fold a driver, which gets the numbers one by one behind its other arguments; the name it is emitted under."""
@@ -115,27 +124,27 @@ class Emission:
             self.numbers.clear()  # only formulas that nobody calls asked for some
         return callee.name
 
-    def _constant(self, function: Callable, scope: Bound | None, suffix: str, name: str) -> ast.expr:
+    def _constant(self, source: Source, scope: Bound | None, suffix: str, name: str) -> ast.expr:
         if scope is not None and name in scope.constants:
             return given(scope.constants[name], f"{scope.owner or suffix.removeprefix('__')}.{name}")
         if name in self.constants:
             return given(self.constants[name], name)
-        value = function.__globals__[name]
+        value = source.function.__globals__[name]
         if isinstance(value, (bool, int, float)) or (
             isinstance(value, tuple) and all(isinstance(v, (int, float)) for v in value)
         ):
             return literal(value)
         raise KeyError(name)
 
-    def _callee(self, caller: Callable, scope: Bound | None, suffix: str, name: str) -> Callee:
+    def _callee(self, caller: Source, scope: Bound | None, suffix: str, name: str) -> Callee:
         if name in self.bindings:
-            bound = self.bindings[name]
-            return self.add(bound.function, bound, "__" + name)
+            return self.add_bound(name)
         record, _, formula = name.rpartition(".")
-        function = getattr(Source(caller).parameters[record], formula) if record else caller.__globals__[name]
+        law = caller.parameters[record] if record else None
+        function = getattr(law, formula) if law else caller.function.__globals__[name]
         if not callable(function) or not hasattr(function, "__code__"):
             raise KeyError(name)
-        return self.add(function, scope, suffix if scope and scope.constants else "")
+        return self.add(function, scope, suffix if scope and scope.constants else "", law)
 
 
 def number_names(count: int) -> list[str]:

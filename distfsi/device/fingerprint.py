@@ -17,42 +17,45 @@ from distfsi.formulas.subset import Varying
 WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone
 
 
-def fingerprint(driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str) -> str:
+def fingerprint(
+    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound | type], real: str
+) -> str:
     """A hash of the functions that a driver can reach, as Python has compiled them, and of what a scene gives to the
-    names in them: constants and formulas, but of floats only whether they are 0."""
+    names in them: constants, formulas and records, but of floats only whether they are 0."""
     seen: set[tuple] = set()
     told = hashlib.sha256(texts_depend_on() + real.encode())
+    chosen = {name: record for name, record in bindings.items() if isinstance(record, type)}
 
-    def tell(function: Callable, scope: Mapping[str, object], owner: str) -> None:
-        if (function, owner) in seen:
+    def tell(function: Callable, scope: Mapping[str, object], owner: str, law: type | None) -> None:
+        if (function, owner, law) in seen:
             return
-        seen.add((function, owner))
+        seen.add((function, owner, law))
         code, names = _compiled(function)
         told.update(code)
-        records = [record for record in Source(function).parameters.values() if record is not None]
-        told.update(repr([fields_of(record) for record in records]).encode())
+        source = Source(function, chosen | ({"self": law} if law else {}))
+        records = [record for record in source.parameters.values() if record is not None]
+        told.update(repr([(record, fields_of(record)) for record in records]).encode())
         for name in names:
             for known in (name, f"self.{name}"):
                 if known in scope:
                     told.update(f"{known} of {owner} = {_shape(scope[known])}".encode())
                 elif known in constants:
                     told.update(f"{known} = {_shape(constants[known])}".encode())
-            if name in bindings:
-                bound = bindings[name]
+            bound = bindings.get(name)
+            if isinstance(bound, Bound):
                 told.update(f"{name} is {bound.owner}".encode())
-                tell(bound.function, bound.constants, bound.owner or name)
+                tell(bound.function, bound.constants, bound.owner or name, bound.law)
                 continue
             value = function.__globals__.get(name)
-            formulas = [getattr(record, name, None) for record in records]
-            for callee in [value, *formulas]:
+            for callee, its_law in [(value, None), *((getattr(record, name, None), record) for record in records)]:
                 if hasattr(callee, "__code__"):
-                    tell(callee, scope, owner)
+                    tell(callee, scope, owner, its_law)
             if is_record(value):
                 told.update(repr(fields_of(value)).encode())
             if isinstance(value, (bool, int, float, tuple)):
                 told.update(f"{name} = {value!r}".encode())
 
-    tell(driver, {}, "")
+    tell(driver, {}, "", None)
     return told.hexdigest()[:20]
 
 

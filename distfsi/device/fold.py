@@ -46,17 +46,24 @@ class Bound:
     """The formula a scene puts in the place of a name, with the constants that belong to it alone.
 
     owner  whose constants they are: formulas of one owner share its numbers
+    law    whose formula it is, if it is one of a law: the law may have inherited it
     """
 
     function: Callable
     constants: Mapping[str, object] = field(default_factory=dict)
     owner: str = ""
+    law: type | None = None
 
     @classmethod
     def of(cls, law: object, formula: str, owner: str = "") -> Bound:
         """A formula of a law whose fields the scene gives."""
         fields = {f"self.{name}": getattr(law, name) for name in fields_of(type(law))}
-        return cls(getattr(type(law), formula), fields, owner)
+        return cls(getattr(type(law), formula), fields, owner, type(law))
+
+    @classmethod
+    def from_table(cls, law: type, formula: str) -> Bound:
+        """A formula of a law that gets the fields of the law in each call, as a tuple in the place of `self`."""
+        return cls(getattr(law, formula), law=law)
 
 
 @dataclass(frozen=True)
@@ -79,9 +86,13 @@ class Callee:
 
 @dataclass(frozen=True)
 class Source:
-    """A function's text: its tree, its file and line, and the names its module gives it."""
+    """A function's text: its tree, its file and line, and the names its module gives it.
+
+    records  classes that the scene puts in the place of those of parameters, by their names; "self": the law
+    """
 
     function: Callable
+    records: Mapping[str, type] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -106,9 +117,11 @@ class Source:
         for name in code.co_varnames[: code.co_argcount]:
             class_ = self.function.__annotations__.get(name)
             if name == "self":
-                class_ = _class_of(self.function)
+                class_ = self.records.get("self") or _class_of(self.function)
             elif isinstance(class_, str):
                 class_ = eval(class_, self.function.__globals__)  # annotations of the project's own sources
+            if is_record(class_):
+                class_ = self.records.get(class_.__name__, class_)
             found[name] = class_ if is_record(class_) else None
         return found
 
@@ -230,7 +243,7 @@ def given(value: object, label: str) -> ast.expr:
     return Number(f"given[{label!r}]", float(value)) if is_number else ast.Constant(value)
 
 
-def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> dict[str, float | Varying]:
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound | type]) -> dict[str, float | Varying]:
     """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
     found: dict[str, float | Varying] = {}
 
@@ -244,8 +257,9 @@ def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound]
     for name, value in constants.items():
         put(value, name)
     for word, bound in bindings.items():
-        for name, value in bound.constants.items():
-            put(value, f"{bound.owner or word}.{name}")
+        if isinstance(bound, Bound):
+            for name, value in bound.constants.items():
+                put(value, f"{bound.owner or word}.{name}")
     return found
 
 
@@ -515,8 +529,14 @@ class Fold(ast.NodeTransformer):
         return node
 
     def visit_Subscript(self, node: ast.Subscript):
-        node.value, node.slice = self.visit(node.value), self.visit(node.slice)
+        record, node.slice = self.record_of(node.value), self.visit(node.slice)
         known, index = constant_of(node.slice)
+        if record is not None:
+            if not known:
+                raise self.refuse(node, "the number of a record's field must be fixed by the scene")
+            attribute = ast.Attribute(node.value, list(fields_of(record[1]))[index], ast.Load())
+            return self.field_of(ast.copy_location(attribute, node), *record)
+        node.value = self.visit(node.value)
         if known and isinstance(node.value, ast.Tuple):
             return node.value.elts[index]
         if not known and not self.in_kernel:

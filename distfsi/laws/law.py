@@ -25,6 +25,7 @@ class Entry:
     vector   whether it is one number per dimension
     limits   by name, "above", "at_least", "below", "at_most", in SI
     default  of the input, or NEEDED
+    key      in the input, where it is not the field's name
     """
 
     meaning: str
@@ -32,6 +33,7 @@ class Entry:
     limits: Mapping[str, float]
     default: object
     vector: bool = False
+    key: str | None = None
 
 
 def quantity(unit: str, meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -44,9 +46,9 @@ def number(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     return quantity("1", meaning, default=default, **limits)
 
 
-def vector(unit: str, meaning: str, *, default: object = NEEDED) -> Any:
-    """A field that has a number in this unit for each dimension."""
-    return field(metadata={"entry": Entry(meaning, unit, {}, default, vector=True)})
+def vector(unit: str, meaning: str, *, default: object = NEEDED, key: str | None = None) -> Any:
+    """A field that has a number in this unit for each dimension; `key` in the input, if that is not its name."""
+    return field(metadata={"entry": Entry(meaning, unit, {}, default, vector=True, key=key)})
 
 
 def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -56,7 +58,7 @@ def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
 
 @dataclass(frozen=True)
 class Law:
-    """A law of any kind; `folder` in laws/ holds those of its kind.
+    """A law of any kind; `folder` of the package holds those of its kind.
 
     partner  word of the other law that a body needs with this one: a solid's EOS with a strength, or the reverse
     """
@@ -77,7 +79,7 @@ class FluidEos(Law):
     closed_form  whether phases relax along the hyperbola of fluid/formulas/relaxation.py; else it is fitted
     """
 
-    folder = "fluid"
+    folder = "laws/fluid"
     closed_form: ClassVar[bool] = False
 
     def reference(self, rho: float) -> tuple[float, float]:
@@ -101,7 +103,7 @@ class FluidEos(Law):
 class SolidEos(Law):
     """The pressure of a solid."""
 
-    folder = "solid/eos"
+    folder = "laws/solid/eos"
 
     def rest_bulk_modulus(self, density: float) -> float:
         """Bulk modulus [Pa] at rest, where the material has this density [kg/m3]."""
@@ -116,14 +118,14 @@ class SolidEos(Law):
 class Strength(Law):
     """How a solid resists a change of its shape, with `shear_modulus` [Pa] at rest."""
 
-    folder = "solid/strength"
+    folder = "laws/solid/strength"
     shear_modulus: float
 
 
 class Failure(Law):
     """What breaks a solid."""
 
-    folder = "solid/failure"
+    folder = "laws/solid/failure"
 
 
 class Source(Law):
@@ -133,7 +135,7 @@ class Source(Law):
     steady  whether the share is the same at all times
     """
 
-    folder = "sources"
+    folder = "laws/sources"
     steady: ClassVar[bool] = False
     acceleration: tuple[float, ...]
 

@@ -16,7 +16,7 @@ def word_of(law: type[Law]) -> str:
 
 def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
     """The laws in the folder of a kind, those with the fewest fields first."""
-    package = import_module(f"distfsi.laws.{kind.folder.replace('/', '.')}")
+    package = import_module(f"distfsi.{kind.folder.replace('/', '.')}")
     modules = [import_module(f"{package.__name__}.{each.name}") for each in pkgutil.iter_modules(package.__path__)]
     found = [law for module in modules for law in vars(module).values() if _is_law_of(law, kind, module.__name__)]
     return tuple(sorted(found, key=lambda law: (len(fields(law)), word_of(law))))

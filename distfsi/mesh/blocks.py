@@ -1,4 +1,4 @@
-"""The grid of cells and its cut into blocks: their order, their owners, their places in memory.
+"""The grid of cells and its cut into blocks: their order, their owners, where they lie in memory.
 
 Index axes are x, y, z in this order everywhere except in array shapes, where x is last and fastest.
 """
@@ -70,7 +70,7 @@ class Blocks:
     block_cells     cells of a whole block along x, y, z
     along           blocks along x, y, z
     count           number of all blocks
-    coordinates     (count, 3) place of each block among the blocks
+    coordinates     (count, 3) index of each block among the blocks, along each axis
     curve_index     (along x, along y, along z) the inverse of `coordinates`
     owners          (count,) rank of each block; ascending
     first           curve index of this rank's first block

@@ -38,7 +38,7 @@ def plot(
 
     field: of the cells (default pressure); particles: field that colors the particles (default plastic strain or, where
     nothing has yielded, speed); time: only the frame nearest to it [s]; every: each so many frames; slice: plane of
-    three dimensions, (axis, place [m]), by default the one that shows most of the bodies; movie: the frames as an
+    three dimensions, (axis, position [m]), by default the one that shows most of the bodies; movie: the frames as an
     animated GIF, too. Runs along a line are drawn with all their fields. Raises InputError where the directory has no
     such thing.
     """

@@ -9,6 +9,7 @@ from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 
+from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
@@ -25,19 +26,14 @@ from distfsi.scene.description import (
     Tube,
 )
 from distfsi.scene.faults import Fault, Path, one_of
+from distfsi.scene.law_tables import GaugeInput
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
-    BodyGauge,
     CouplingInput,
     DomainInput,
     FluidInput,
-    GaugeInput,
-    LineGauge,
     OutputInput,
-    ParticleGauge,
     PerformanceInput,
-    PlaneGauge,
-    PointGauge,
     Sections,
 )
 from distfsi.scene.shapes import bounding_box, contains
@@ -274,34 +270,22 @@ def check_gauges(
     given: Mapping[str, GaugeInput], present: Container[str], domain: Domain, solid: Solid | None
 ) -> Iterator[Fault]:
     """Gauges have something to measure, inside the domain."""
-    for name, gauge in given.items():
-        path = ("gauges", name)
+    bodies = [body.name for body in solid.bodies] if solid else []
+    for name, table in given.items():
+        path, gauge = ("gauges", name), table.build()
         if not FILE_NAME.fullmatch(name):
             yield Fault(path, "is no name for a file; expected letters, digits, - and _")
-        material = "solid" if isinstance(gauge, ParticleGauge | BodyGauge) else "fluid"
-        if material not in present:
-            yield Fault((*path, "kind"), f"'{gauge.kind}' needs a {material}")
-        elif material == "fluid":
-            yield from _check_position(path, gauge, domain)
-        elif solid is not None and gauge.body not in (bodies := [body.name for body in solid.bodies]):
-            yield Fault((*path, "body"), f"'{gauge.body}' is no body" + one_of(bodies, gauge.body))
+        if gauge.needs not in present:
+            yield Fault((*path, "kind"), f"'{table.kind}' needs a {gauge.needs}")
+        elif gauge.needs == "fluid" or solid is not None:
+            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _outside(gauge, domain):
+                yield Fault((*path, key), text + (one_of(bodies, getattr(gauge, key)) if key == "body" else ""))
 
 
-def _check_position(path: Path, gauge: PointGauge | LineGauge | PlaneGauge, domain: Domain) -> Iterator[Fault]:
-    ends = dict(zip(AXES, zip(domain.lower, domain.upper, strict=True), strict=False))
-    match gauge:
-        case PointGauge(position=position):
-            positions = {"position": dict(zip(AXES, position, strict=False))}
-        case LineGauge(start=start, end=end):
-            positions = {"from": dict(zip(AXES, start, strict=False)), "to": dict(zip(AXES, end, strict=False))}
-        case PlaneGauge(axis=axis, position=position):
-            if domain.dimensions == 1 or axis not in ends:
-                yield Fault((*path, "axis"), f"'{axis}' in a domain of {domain.dimensions} dimension(s)")
-                return
-            positions = {"position": {axis: position}}
-    for key, position in positions.items():
-        if not all(ends[axis][0] <= x <= ends[axis][1] for axis, x in position.items()):
-            yield Fault((*path, key), "lies outside the domain")
+def _outside(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
+    for key, position in gauge.positions().items():
+        if not all(domain.lower[axis] <= x <= domain.upper[axis] for axis, x in position.items()):
+            yield key, "lies outside the domain"
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

@@ -1,13 +1,14 @@
-"""Tables of the input for the laws of materials, made from the fields of their dataclasses."""
+"""Tables of the input for laws and gauges, made from the fields of their dataclasses."""
 
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from types import NoneType
-from typing import Annotated, Any, Literal, Union, cast, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from distfsi.gauges import Gauge
 from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
 from distfsi.narrowing import present
@@ -38,7 +39,8 @@ def table_of(law: type[Law], key: str | None = None, word: str | None = None) ->
 
 def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
     """Type and description of one key."""
-    options = {type_} if given.vector else set(get_args(type_)) - {NoneType} or {type_}
+    whole = given.vector or get_origin(type_) is Literal
+    options = {type_} if whole else set(get_args(type_)) - {NoneType} or {type_}
     kind: Any = next(iter(options))
     limits: dict[str, Any] = {LIMITS[name]: limit for name, limit in given.limits.items()}
     found: Any
@@ -48,10 +50,12 @@ def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
         found = vector(present(given.unit))
     elif given.unit is not None:
         found = quantity(given.unit, **limits)
+    elif whole:
+        found = kind
     else:
         found = Annotated[kind, Field(strict=True, **limits)]
     default = ... if given.default is NEEDED else given.default
-    return (found | None if kind is not type_ else found), Field(default, description=given.meaning)
+    return (found | None if kind is not type_ else found), Field(default, alias=given.key, description=given.meaning)
 
 
 def choice(kind: type[Law], key: str = "kind") -> Any:
@@ -68,6 +72,7 @@ PhaseInput = choice(FluidEos, "eos")
 SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
 SourceInput = choice(Source)
+GaugeInput: Any = choice(Gauge)
 _StrengthTable: Any = choice(Strength)
 StrengthInput = Annotated[
     _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])

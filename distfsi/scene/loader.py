@@ -86,6 +86,6 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         output=build.build_output(sections.output, stem, fluid),
         performance=build.build_performance(sections.performance, dimensions),
         coupling=build.build_coupling(sections.coupling),
-        gauges=build.build_gauges(sections.gauges, sections.time.end, list(sections.solid.bodies if solid else ())),
+        gauges={name: gauge.build() for name, gauge in sections.gauges.items()},
     )
     return scene, faults

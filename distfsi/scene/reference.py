@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from distfsi.gauges import Gauge
 from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.loader import schema
@@ -53,7 +54,7 @@ SECTIONS = {
     "`[sources.NAME]`": _names(Source),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
-    "`[gauges.NAME]`": ("PointGauge", "LineGauge", "PlaneGauge", "ParticleGauge", "BodyGauge"),
+    "`[gauges.NAME]`": _names(Gauge),
     "`[coupling]`": ("CouplingInput",),
     "`[performance]`": ("PerformanceInput",),
 }

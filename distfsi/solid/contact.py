@@ -1,4 +1,4 @@
-"""Contact of particles without a bond: different bodies, what a crack has parted, debris."""
+"""Contact of particles without a bond: different bodies, the faces of a crack, debris."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ import numpy as np
 from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
 from distfsi.solid.kernels import contact as kernels
-from distfsi.solid.kernels.bonds import DEBRIS
-from distfsi.solid.kernels.pairs import SMOOTHING
+from distfsi.solid.kernels.records import DEBRIS, SMOOTHING, Contacts, Neighbours, Particles, SearchMemory
 from distfsi.solid.neighbours import Near, NeighbourSearch
 
-DRIVERS = (kernels.mark_touching, kernels.remember, kernels.mark_invalid, kernels.touch, kernels.heat_contact)
+DRIVERS = (
+    kernels.mark_exposed,
+    kernels.remember_search,
+    kernels.mark_outdated,
+    kernels.accelerate_contacts,
+    kernels.heat_contacts,
+)
 SKIN = 0.5  # of a particle's size: how far a search looks beyond particles that touch
 
 
@@ -28,76 +33,82 @@ class Contact:
     def __init__(self, kernels: SimpleNamespace, rows: Rows, search: NeighbourSearch, dimensions: int):
         self._kernels, self._device, self._rows = kernels, rows.device, rows
         self._search, self._dimensions = search, dimensions
-        self.forget()
+        self._last: SearchMemory | None = None
+        self._chosen: Any = None  # rows of the exposed particles
+        self._neighbours: Neighbours | None = None
+        self._contacts: Contacts | None = None
 
     def forget(self) -> None:
         """Search anew in the next step."""
-        self._then: tuple | None = None
+        self._last = None
 
-    def find(self, c: Columns, near: Near, reference: Any, facts: Any, through: Any) -> None:
-        """Find who may touch, with the `reference` positions (count, D), the `facts` (count, …) of
-        solid/kernels/bonds.py and the axes `through` (bodies,) which bodies go on. Particles with a bond do not
-        touch."""
-        device, count = self._device, near.plan.count
-        size, parted = device.empty(count), device.empty(count)
+    def find(self, c: Columns, near: Near, reference: Any, payload: Any, continued: Any) -> None:
+        """Find who may touch, with the `reference` positions (count, D), the `payload` (count, …) with the columns of
+        solid/kernels/records.py and the axes `continued` (bodies,) along which bodies go on. Particles with a bond do
+        not touch."""
+        device, count, key = self._device, near.plan.count, near.plan.key.device
+        size, rupture_length = device.empty(count), device.empty(count)
         side, mark = device.empty(count, np.int64), device.empty(count, np.int8)
-        known = (near.plan.key.device, facts, near.position, size)
-        device.run(self._kernels.mark_touching, count, near.state, facts, known[0], through, size, parted, side, mark)
+        found = (size, rupture_length, side, mark)
+        device.run(self._kernels.mark_exposed, count, near.state, payload, key, continued, *found)
         number, rows = self._rows.marked(mark)
-        if not self._still_valid(number, rows, known):
-            self._then = device.empty(number, np.int64), device.empty((number, self._dimensions)), device.empty(number)
-            device.run(self._kernels.remember, number, rows, *known, *self._then)
-            self._table, self._count = self._candidates(c, near, device.download(rows), rows, size, facts)
-        self._among = (rows, self._table, self._count)
-        self._pairs = (near.position, near.state, reference, size, parted, side)
+        known = (rows, key, payload, near.position, size)
+        if not self._still_valid(number, known):
+            shapes = ((number, np.int64), ((number, self._dimensions), np.float64), (number, np.float64))
+            self._last = SearchMemory(*(device.empty(*shape) for shape in shapes))
+            device.run(self._kernels.remember_search, number, *known, self._last)
+            self._neighbours = self._candidates(c, near, rows, size, payload)
+        self._chosen = rows
+        self._contacts = Contacts(near.position, near.state, reference, size, rupture_length, side)
 
-    def _still_valid(self, number: int, rows: Any, known: tuple) -> bool:
-        if self._then is None or self._then[0].shape[0] != number:
+    def _still_valid(self, number: int, known: tuple) -> bool:
+        if self._last is None or self._last.identity.shape[0] != number:
             return False
         mark = self._device.empty(number, np.int8)
-        self._device.run(self._kernels.mark_invalid, number, SKIN, rows, *known, *self._then, mark)
+        self._device.run(self._kernels.mark_outdated, number, SKIN, *known, self._last, mark)
         return not self._rows.any(mark)
 
-    def _candidates(
-        self, c: Columns, near: Near, rows: np.ndarray, device_rows: Any, size: Any, facts: Any
-    ) -> tuple[Any, Any]:
-        """Table (own, width) and number (own,) of the particles among `rows` that may soon touch each of them.
+    def _candidates(self, c: Columns, near: Near, device_rows: Any, size: Any, payload: Any) -> Neighbours:
+        """Those of the particles `device_rows` that may soon touch each of the own among them.
 
         Two particles of debris act on each other otherwise.
         """
-        device = self._device
-        position, key, state, size, facts = (
+        device, rows = self._device, self._device.download(device_rows)
+        position, key, state, size, payload = (
             self._rows.taken(array, device_rows)
-            for array in (near.position, near.plan.key.device, near.state, size, facts)
+            for array in (near.position, near.plan.key.device, near.state, size, payload)
         )
-        state, debris = device.download(state).copy(), device.download(facts)[:, DEBRIS]
+        # A search in which a particle reaches as far as it may soon touch.
+        state, debris = device.download(state).copy(), device.download(payload)[:, DEBRIS]
         reach = (1.0 + SKIN) * device.download(size)
         state[:, SMOOTHING] = 0.5 * reach
         own = int(np.searchsorted(rows, near.own))
         cells = reach.max(initial=np.finfo(float).tiny)
-        self._search.find(own, position, device.array(state), key, cells)
-        found, key, bonds = device.download(self._search.table), device.download(key), c["bonds"]
-        first, place = np.nonzero(np.arange(found.shape[1]) < device.download(self._search.count)[:, None])
-        second = found[first, place]
+        near_each_other = self._search.find(own, Particles(position, device.array(state)), key, cells)
+        # Pairs without a bond, of which at most one is debris.
+        found, key, bonds = device.download(near_each_other.table), device.download(key), c["bonds"]
+        first, index = np.nonzero(np.arange(found.shape[1]) < device.download(near_each_other.count)[:, None])
+        second = found[first, index]
         apart = debris[first] * debris[second] == 0
         first, second = first[apart], second[apart]
         free = ~(bonds[rows[first]] == key[second][:, None]).any(axis=1)
         first, second = first[free], second[free]
+        # A table in which each particle has its partners in the order of their keys.
         order = np.lexsort((key[second], first))
         first, second = first[order], second[order]
         count = np.bincount(first, minlength=own)
         table = np.zeros((own, count.max(initial=0)), dtype=np.int32)
         table[first, np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)] = second
-        return device.array(table), device.array(count)
+        return Neighbours(device.array(table), device.array(count))
 
     def accelerate(self, mass: Any, acceleration: Any) -> None:
         """Add the contact forces to the `acceleration` (own, D); after find()."""
-        self._device.run(
-            self._kernels.touch, self._count.shape[0], *self._among, *self._pairs, mass, acceleration
-        )  # fmt: skip
+        self._run(self._kernels.accelerate_contacts, mass, acceleration)
 
     def heat(self, mass: Any, dt: float, motion: Any, energy: Any) -> None:
         """Advance the `energy` (own,) by half the work of the contact forces with the mean velocities `motion`."""
-        self._device.run(
-            self._kernels.heat_contact, self._count.shape[0], *self._among, *self._pairs, mass, dt, motion, energy
-        )  # fmt: skip
+        self._run(self._kernels.heat_contacts, mass, dt, motion, energy)
+
+    def _run(self, kernel: Any, *arguments: Any) -> None:
+        pairs = (self._chosen, self._neighbours, self._contacts)
+        self._device.run(kernel, self._neighbours.count.shape[0], *pairs, *arguments)

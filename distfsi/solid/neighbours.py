@@ -14,9 +14,10 @@ from distfsi.mesh import search
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.particles import GhostPlan, Parity
 from distfsi.mesh.rows import Rows
-from distfsi.solid.kernels import pairs as kernels
+from distfsi.solid.kernels import neighbours as kernels
+from distfsi.solid.kernels.records import Neighbours, Particles
 
-DRIVERS = (*search.DRIVERS, kernels.find_neighbours, kernels.place_among, row_kernels.find_largest)
+DRIVERS = (*search.DRIVERS, kernels.find_neighbours, kernels.scatter_neighbours, row_kernels.find_largest)
 
 
 @dataclass
@@ -25,9 +26,9 @@ class Near:
 
     plan      how values of own particles get to the ghosts and images
     position  (count, D) [m]
-    state     (count, 4 + D) the columns of solid/kernels/pairs.py
+    state     (count, 4 + D) packed, with the columns of solid/kernels/records.py
     support   how far the widest kernel of all ranks reaches [m]
-    ghost_payload  what the solid's form wants to know of ghosts and images besides
+    payload   what the solid's form wants to know of ghosts and images besides
     flags     the largest of each of the form's flags over all ranks
     """
 
@@ -35,12 +36,18 @@ class Near:
     position: Any
     state: Any
     support: float
-    ghost_payload: list[Any]
+    payload: list[Any]
     flags: np.ndarray
 
     @property
     def own(self) -> int:
+        """How many particles are this rank's own."""
         return self.plan.own
+
+    @property
+    def particles(self) -> Particles:
+        """Positions and states, for kernels."""
+        return Particles(self.position, self.state)
 
     @property
     def vector(self) -> Parity:
@@ -61,46 +68,40 @@ class Near:
 
 
 class NeighbourSearch:
-    """Finds neighbours with a grid of search cells from the corner `lower` to `upper` [m], the same on all ranks.
-
-    table  (own, width) int32, on the device: the neighbours of each particle, search cell by search cell, in the order
-           of their keys
-    count  (own,): how many there are
-    """
+    """Finds neighbours with a grid of search cells from the corner `lower` to `upper` [m], the same on all ranks."""
 
     def __init__(self, kernels: SimpleNamespace, device: Device, lower: tuple[float, ...], upper: tuple[float, ...]):
         """`kernels` holds DRIVERS."""
         self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
         self._cells = search.CellSort(kernels, device, lower, upper)
         self._width = 4 * 6 ** (len(lower) - 1)
-        self.table, self.count = device.empty((0, self._width), np.int32), device.empty(0, np.int64)
-        self._found = self.table  # by the last find(); used again, as fresh memory costs more than the search
+        self._table = device.empty((0, self._width), np.int32)  # kept, as fresh memory costs more than the search
 
-    def find(self, own: int, position: Any, state: Any, key: Any, size: float) -> None:
-        """Find the neighbours, closer than h_i + h_j, of the first `own` particles, with search cells of `size` [m].
-
-        The table lasts until the next call.
+    def find(self, own: int, particles: Particles, key: Any, size: float) -> Neighbours:
+        """The neighbours of the first `own` particles, closer than h_i + h_j, search cell by search cell of `size` [m],
+        in the order of their keys. The table (own, width) int32 of the device lasts until the next call.
         """
-        cell, cells = self._cells.sort(position, key, size)
-        across = self._cells.strides[1 : position.shape[1]]  # rows of three cells lie along x
+        cell, cells = self._cells.sort(particles.position, key, size)
+        across = self._cells.strides[1 : particles.position.shape[1]]  # rows of three cells lie along x
         rows = np.array([np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))], dtype=np.int64)
-        near = (position, state, cell, cells.start, cells.order, self._device.array(np.sort(rows)))
-        self.count = self._device.empty(own, np.int64)
+        near = (particles, cell, cells.start, cells.order, self._device.array(np.sort(rows)))
+        count = self._device.empty(own, np.int64)
         while True:
-            if self._found.shape != (own, self._width):
-                self._found = self._device.empty((own, self._width), np.int32)
-            self.table = self._found
-            self._device.run(self._kernels.find_neighbours, own, *near, self.table, self.count)
-            most = self._rows.largest(self.count, 0)
+            if self._table.shape != (own, self._width):
+                self._table = self._device.empty((own, self._width), np.int32)
+            found = Neighbours(self._table, count)
+            self._device.run(self._kernels.find_neighbours, own, *near, found)
+            most = self._rows.largest(count, 0)
             if most <= self._width:
-                return
+                return found
             self._width = int(1.2 * most)
 
-    def find_among(self, rows: Any, own: int, position: Any, state: Any, key: Any, size: float) -> None:
+    def find_among(self, rows: Any, own: int, particles: Particles, key: Any, size: float) -> Neighbours:
         """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;
         the others have no neighbours."""
         chosen = int(np.searchsorted(self._device.download(rows), own))
-        self.find(chosen, *(self._rows.taken(array, rows) for array in (position, state, key)), size)
-        table, count = self._device.empty((own, self._width), np.int32), self._device.zeros(own, np.int64)
-        self._device.run(self._kernels.place_among, chosen, rows, self.table, self.count, table, count)
-        self.table, self.count = table, count
+        position, state, key = (self._rows.taken(array, rows) for array in (*particles, key))
+        among = self.find(chosen, Particles(position, state), key, size)
+        found = Neighbours(self._device.empty((own, self._width), np.int32), self._device.zeros(own, np.int64))
+        self._device.run(self._kernels.scatter_neighbours, chosen, rows, among, found)
+        return found

@@ -1,9 +1,9 @@
 """The solid: smoothed particles, their motion and their books (paper, Sec. 2.1 and Appendix A).
 
-How particles act on each other is a matter of the solid's form: updated.py, bonds.py. A step needs three or four
-messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the corrected stress, the
-new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the
-particles.
+How particles act on each other is a matter of the solid's form: updated.py, total_lagrangian.py. A step needs
+three or four messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the
+corrected stress, the new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which
+strains and moves the particles.
 """
 
 from __future__ import annotations
@@ -25,11 +25,10 @@ from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
-from distfsi.solid import neighbours, pieces, updated
-from distfsi.solid import total_lagrangian as bonds
+from distfsi.solid import neighbours, pieces, total_lagrangian, updated
 from distfsi.solid.formulas.strength import von_mises
 from distfsi.solid.kernels import material, motion
-from distfsi.solid.kernels import pairs as kernels
+from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
 from distfsi.solid.protocol import SolidForm
@@ -40,22 +39,22 @@ DRIVERS = (
     *particle_kernels.EXCHANGE,
     *neighbours.DRIVERS,
     *row_kernels.REDUCTIONS,
-    motion.collect_state,
+    motion.pack_state,
     motion.kick,
-    motion.push,
-    motion.average,
+    motion.apply_impulse,
+    motion.average_velocity,
     motion.move,
     material.deform,
     *updated.DRIVERS,
-    *bonds.DRIVERS,
+    *total_lagrangian.DRIVERS,
 )
 SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
 class Solid:
-    """All particles of this rank. A step is prepare(), time_step(), advance(dt), push(impulse), migrate(); of these a
-    sub-step is the first three.
+    """All particles of this rank. A step is prepare(), time_step(), advance(dt), apply_impulse(impulse), migrate(); of
+    these a sub-step is the first three.
 
     columns  this rank's particles on host and device, in any order: id, body, fixed (n,), position [m],
              velocity [m/s] (n, D), mass [kg], h [m], density [kg/m3], energy [J/kg] (specific, internal), and what the
@@ -72,16 +71,44 @@ class Solid:
 
     def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
         self.blocks, self.communicator, self.team = blocks, communicator, team
-        self.dimensions = scene.domain.dimensions
-        self.materials = Materials(scene.solid, self.dimensions)
+        self.dimensions = D = scene.domain.dimensions
+        self.materials = Materials(scene.solid, D)
         self._tables = [team.array(table) for table in self.materials.tables]
-        axes = range(self.dimensions)  # parities: the axes whose reflection changes the sign of each component
-        self._vector = tuple((a,) for a in axes)
-        self._components = self.dimensions * (self.dimensions + 1) // 2
-        self.body_force = BodyForce(scene.sources, self.dimensions)
-        constants = {
-            "DIMENSIONS": self.dimensions,
-            "COMPONENTS": self._components,
+        self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
+        self.body_force = BodyForce(scene.sources, D)
+        constants = self._constants(scene)
+        self.kernels = team.build(DRIVERS, constants)
+        self._von_mises = plain(von_mises, constants)
+        self.exchange = ParticleExchange(blocks, team, self.kernels)
+        self.form = self._form(scene)
+        # Sums over all steps, and of the last one.
+        self._boundary_impulse = np.zeros((blocks.local_count, D))
+        self._gravity_work = np.zeros(blocks.local_count)
+        self.work = np.zeros(blocks.local_count)
+        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), D))
+        # What prepare() finds.
+        self._near: Near | None = None
+        self._acceleration, self._limits = team.empty((0, D)), team.empty((0, len(LIMITS)))
+        self.start, self.before, self.carried = (team.empty((0, D)) for _ in range(3))
+        self.sub_steps = 0
+        self._shown: list[str] = []  # columns of others that field files show
+        # What migrate() finds: the block of each particle, and the particles by block, body and id.
+        self._home: DualArray | None = None
+        self._block = self._order = np.empty(0, dtype=np.int64)
+        self._groups: Groups | None = None
+        # The particles of this rank's blocks.
+        c = self._own_particles(scene)
+        self.columns = Columns(team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
+        self.migrate()
+        self._deform(0.0, team.zeros((self.count, D**2)))
+        self.form.bind(self.columns, self.exchange)
+
+    def _constants(self, scene: Scene) -> dict[str, object]:
+        """What the kernels are specialised for."""
+        D = self.dimensions
+        return {
+            "DIMENSIONS": D,
+            "COMPONENTS": D * (D + 1) // 2,
             "BODY_FORCE": self.body_force.acceleration,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
@@ -89,37 +116,22 @@ class Solid:
             "ARTIFICIAL_STRESS": scene.solid.artificial_stress,
             "ZERO_ENERGY": scene.solid.zero_energy,
         } | self.materials.constants
-        self.kernels = team.build(DRIVERS, constants)
-        self._von_mises = plain(von_mises, constants)
-        self.exchange = ParticleExchange(blocks, team, self.kernels)
-        search = NeighbourSearch(self.kernels, team, scene.domain.lower, scene.domain.upper)
-        self.form: SolidForm = UpdatedLagrangian(
-            self.kernels, team, search, self.dimensions, scene.solid.artificial_stress > 0.0
-        )
-        if scene.solid.form == "total_lagrangian":
-            given = (communicator, scene.solid, *self._tables[:2], self.dimensions)
-            self.form = TotalLagrangian(self.kernels, self.exchange, search, *given)
-        self._boundary_impulse = np.zeros((blocks.local_count, self.dimensions))
-        self._gravity_work = np.zeros(blocks.local_count)
-        self.work = np.zeros(blocks.local_count)
-        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), self.dimensions))
-        self._home: DualArray | None = None
-        self._shown: list[str] = []
-        self.sub_steps = 0
-        self._own_particles(scene)
 
-    def _own_particles(self, scene: Scene) -> None:
-        """Pack the bodies and keep the particles of this rank's blocks."""
+    def _form(self, scene: Scene) -> SolidForm:
+        search = NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
+        if scene.solid.form == "total_lagrangian":
+            given = (self.communicator, scene.solid, *self._tables[:2], self.dimensions)
+            return TotalLagrangian(self.kernels, self.exchange, search, *given)
+        repels = scene.solid.artificial_stress > 0.0
+        return UpdatedLagrangian(self.kernels, self.team, search, self.dimensions, repels)
+
+    def _own_particles(self, scene: Scene) -> dict[str, np.ndarray]:
+        """Pack the bodies; the columns of the particles in this rank's blocks."""
         columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
         columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
         columns["id"] = np.arange(len(columns["body"]))
         mine = self.blocks.owners[self.blocks.block_of(columns["position"])] == self.communicator.rank
-        c = {name: column[mine] for name, column in columns.items()}
-        c["energy"] = np.zeros(len(c["id"]))
-        self.columns = Columns(self.team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
-        self.migrate()
-        self._deform(0.0, self.team.zeros((len(c["id"]), self.dimensions**2)))
-        self.form.bind(self.columns, self.exchange)
+        return {name: column[mine] for name, column in columns.items()}
 
     def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
         body = scene.solid.bodies[b]
@@ -134,6 +146,7 @@ class Solid:
             "mass": body.density * volume,
             "density": np.full(n, body.density),
             "h": np.full(n, scene.solid.smoothing * body.spacing),
+            "energy": np.zeros(n),
         }
 
     # ---- the step ---------------------------------------------------------------------------------------------------
@@ -151,18 +164,18 @@ class Solid:
         support *= 2.0
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
-        state, parity = device.empty((own, kernels.VELOCITY + self.dimensions)), ((),) * kernels.VELOCITY
-        device.run(self.kernels.collect_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
-        (here,) = c.read("position")
+        state, parity = device.empty((own, VELOCITY + self.dimensions)), ((),) * VELOCITY
+        device.run(self.kernels.pack_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
+        (now,) = c.read("position")
         if not goes_on:
-            self.start, self.sub_steps = here, 0
+            self.start, self.sub_steps = now, 0
             self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
-            self._run(self.kernels.average, 1, *c.read("velocity"), self.before)
+            self._run(self.kernels.average_velocity, 1, *c.read("velocity"), self.before)
         reach = max(reach, support)
-        plan = self.exchange.ghosts(here, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
-        given = [(here, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
-        position, state, *told = plan.exchange(given)
-        self._near = Near(plan, position, state, support, told, flags)
+        plan = self.exchange.ghosts(now, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
+        given = [(now, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
+        position, state, *payload = plan.exchange(given)
+        self._near = Near(plan, position, state, support, payload, flags)
         self._acceleration = device.zeros((own, self.dimensions))
         self._limits = device.empty((own, len(LIMITS)))
         self.form.accelerate(c, self._near, self._acceleration, self._limits)
@@ -173,8 +186,8 @@ class Solid:
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
-        dt, place = rows.least(rows.taken(self._limits, self._groups.rows).reshape(-1))
-        particle, cause = divmod(place, len(LIMITS))
+        dt, index = rows.minimum(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        particle, cause = divmod(index, len(LIMITS))
         dt, id = float(dt), self.columns["id"][self._order[particle]]
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
 
@@ -207,7 +220,7 @@ class Solid:
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
         c.adopt("position", moved)
         self.sub_steps += 1
-        self._run(self.kernels.average, self.sub_steps, velocity, self.carried)
+        self._run(self.kernels.average_velocity, self.sub_steps, velocity, self.carried)
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
@@ -218,7 +231,7 @@ class Solid:
         c, device, D = self.columns, self.team, self.dimensions
         excess, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
         given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, booked)
-        self._run(self.kernels.push, impulse, *given)
+        self._run(self.kernels.apply_impulse, impulse, *given)
         books = self._per_body(booked).sum(axis=1)
         self.work, self.given = books[:, 0], self._per_body(impulse)
         self._gravity_work += books[:, 1]

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from distfsi.device.interface import Columns, Device
-from distfsi.mesh.particles import ParticleExchange
+from distfsi.mesh.particles import Parity, ParticleExchange
 from distfsi.solid.kernels import pairs as kernels
+from distfsi.solid.kernels.records import Interaction, Neighbours
 from distfsi.solid.neighbours import Near, NeighbourSearch
 
-DRIVERS = (kernels.correct, kernels.accelerate, kernels.heat, kernels.press)
+DRIVERS = (kernels.correct_gradients, kernels.accelerate_pairs, kernels.strain_pairs, kernels.drop_tension)
+
+
+class Carried(NamedTuple):
+    """What particles act on each other with: velocity gradients of all, pressure and deviator of the own."""
+
+    rates: Any
+    pressure: Any
+    deviator: Any
 
 
 class UpdatedLagrangian:
@@ -28,6 +37,7 @@ class UpdatedLagrangian:
         self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
         self._repels = repels
         self._viscous = device.empty((0, 0))  # kept, as fresh memory costs more than what is put into it
+        self._pairs: Interaction | None = None  # of the last accelerate()
 
     def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
         """Add the column."""
@@ -37,44 +47,47 @@ class UpdatedLagrangian:
         """There are no bonds that make pieces."""
 
     def requested_keys(self, columns: Columns) -> np.ndarray | None:
-        """Keys of particles and images that are needed wherever they are."""
+        """None: only particles that are near are needed."""
         return None
 
     def flags(self, columns: Columns) -> list[float]:
-        """What a rank must know of all others."""
+        """None."""
         return []
 
-    def ghost_payload(self, columns: Columns) -> list:
-        """What ghosts and images must have besides the state, with parities: the velocity gradient."""
+    def ghost_payload(self, columns: Columns) -> list[tuple[Any, Parity]]:
+        """The velocity gradient."""
         axes = range(self._dimensions)
         return [(*columns.read("velocity_gradient"), tuple((a, b) for a in axes for b in axes))]
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Write the `acceleration` (own, D) of the forces and the time steps (own, 2) that they allow."""
-        self._search.find(near.own, near.position, near.state, near.plan.key.device, near.support)
-        self._act(near, *near.ghost_payload, *columns.read("pressure", "deviator"), acceleration, limits)
+        neighbours = self._search.find(near.own, near.particles, near.plan.key.device, near.support)
+        (rates,) = near.payload
+        carried = Carried(rates, *columns.read("pressure", "deviator"))
+        self._act(near, neighbours, carried, acceleration, limits)
 
-    def push_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
+    def accelerate_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
         """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure, and
         whose every approach is damped."""
-        self._search.find_among(debris, near.own, near.position, near.state, near.plan.key.device, near.support)
+        among = (debris, near.own, near.particles, near.plan.key.device, near.support)
+        neighbours = self._search.find_among(*among)
         pressure, deviator = columns.read("pressure", "deviator")
-        pushed = self._device.empty(near.own)
-        self._device.run(self._kernels.press, near.own, pressure, pushed)
+        compression = self._device.empty(near.own)
+        self._device.run(self._kernels.drop_tension, near.own, pressure, compression)
         rates = self._device.zeros((near.plan.count, self._dimensions**2))
-        no_shear = self._device.zeros(deviator.shape)
-        self._act(near, rates, pushed, no_shear, acceleration, limits)
+        carried = Carried(rates, compression, self._device.zeros(deviator.shape))
+        self._act(near, neighbours, carried, acceleration, limits)
 
-    def _act(self, near: Near, rates: Any, pressure: Any, deviator: Any, acceleration: Any, limits: Any) -> None:
-        D, own, run = self._dimensions, near.own, self._device.run
-        self._pairs = (near.position, near.state, self._search.table, self._search.count)
+    def _act(self, near: Near, neighbours: Neighbours, carried: Carried, acceleration: Any, limits: Any) -> None:
+        D, own, run, pairs = self._dimensions, near.own, self._device.run, (near.particles, neighbours)
         tension = near.tensor if self._repels else ()
-        self._correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
-        run(self._kernels.correct, own, *self._pairs, pressure, deviator, self._correction, stress)
-        (self._stress,) = near.plan.exchange([(stress, near.matrix + tension)])
-        if self._viscous.shape != self._search.table.shape:
-            self._viscous = self._device.empty(self._search.table.shape)
-        run(self._kernels.accelerate, own, *self._pairs, rates, self._stress, acceleration, limits, self._viscous)
+        correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
+        run(self._kernels.correct_gradients, own, *pairs, carried.pressure, carried.deviator, correction, stress)
+        (stress,) = near.plan.exchange([(stress, near.matrix + tension)])
+        if self._viscous.shape != neighbours.table.shape:
+            self._viscous = self._device.empty(neighbours.table.shape)
+        run(self._kernels.accelerate_pairs, own, *pairs, carried.rates, stress, acceleration, limits, self._viscous)
+        self._pairs = Interaction(neighbours, self._viscous, stress, correction)
 
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance the energy by `dt` [s] with the old and the new `velocity` (count, D), and write the velocity
@@ -83,6 +96,6 @@ class UpdatedLagrangian:
         columns.adopt("velocity_gradient", gradient)
 
     def strain_debris(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
-        """As strain(), after push_debris()."""
-        given = (self._viscous, dt, self._stress, self._correction, velocity, *columns.write("energy"), gradient)
-        self._device.run(self._kernels.heat, near.own, *self._pairs, *given)
+        """As strain(), after accelerate_debris()."""
+        given = (dt, near.particles, self._pairs, velocity, *columns.write("energy"), gradient)
+        self._device.run(self._kernels.strain_pairs, near.own, *given)

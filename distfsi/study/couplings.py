@@ -41,7 +41,7 @@ class Problem:
 def kept_mass(simulation: Simulation) -> Figure:
     """What the coupling has left of the fluid's mass, over that."""
     coupling = present(simulation.coupling)
-    made = sum(amounts[0] for amounts in coupling.ledger().values())
+    made = sum(amounts[0] for amounts in coupling.budget_by_cause().values())
     mass = present(simulation.fluid).totals(coupling.volume)[0][0]
     return Figure("mass", 1.0 + made / mass, 1.0, 1e-12)
 

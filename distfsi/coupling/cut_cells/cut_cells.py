@@ -338,7 +338,7 @@ class CutCells:
         position = self._particles.position
         self._wall_particles.cut(self._wall_particles.find(position), position, self._particles.velocity)
 
-    def ledger(self) -> dict[str, np.ndarray]:
+    def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
         totals = self.blocks.sum(np.hstack([self._wall_sums, self._sides.sums()]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

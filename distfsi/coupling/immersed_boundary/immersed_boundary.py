@@ -323,7 +323,7 @@ class ImmersedBoundary:
         for pair in (self.kind, self._occupied, self._through_sides):
             pair.changed()
 
-    def ledger(self) -> dict[str, np.ndarray]:
+    def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
         count, through = self.blocks.local_count, self._through_sides.host()
         sides = np.stack([np.bincount(self._side_blocks, amounts, count) for amounts in through.T], axis=1)

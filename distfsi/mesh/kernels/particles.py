@@ -65,7 +65,7 @@ def mirror_values(begin, end, first, width, source, mask, parity, values):
 
 @driver
 def mirror_positions(begin, end, first, width, source, mask, plane, values):
-    """As mirror_values(), of positions: `plane` (images, width) holds the places of the mirrors."""
+    """As mirror_values(), of positions: `plane` (images, width) holds the positions of the mirrors."""
     for m in range(begin, end):
         for k in range(width):
             value = values[source[m] * width + k]

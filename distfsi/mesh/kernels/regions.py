@@ -18,7 +18,7 @@ def copy_regions(first, last, table, destination, source, mirror):
     """Copy the regions of rows `first` to `last` (excluded) of `table` from flat array `source` to `destination`.
 
     table   (regions, 14) int64: cells along x, y, z; flips (bit a: mirrored along axis a); then for the destination and
-            for the source the place of the first value and the steps from variable to variable and along x, y, z
+            for the source the index of the first value and the steps from variable to variable and along x, y, z
             (a destination's step along x is always 1)
     mirror  (variables,) int64: axis whose reflection changes the variable's sign, -1 for none
     """

@@ -9,93 +9,112 @@ from distfsi.formulas.symbols import DIMENSIONS
 from distfsi.formulas.tensors import dot
 from distfsi.mesh.kernels.particles import IMAGES
 from distfsi.solid.formulas.contact import contact_force
-from distfsi.solid.kernels.bonds import BODY, DEBRIS, EXPOSED, PARTED
-from distfsi.solid.kernels.pairs import DENSITY, MASS, SOUND_SPEED, VELOCITY, difference
+from distfsi.solid.kernels.matrices import difference, zero_vector
+from distfsi.solid.kernels.records import (
+    BODY,
+    DEBRIS,
+    DENSITY,
+    EXPOSED,
+    MASS,
+    RUPTURE_LENGTH,
+    SOUND_SPEED,
+    VELOCITY,
+    Contacts,
+    Neighbours,
+    SearchMemory,
+)
 
 SAME_BODY = 0.6  # of the size: lattices that flow plastically do not touch themselves
 
 
-@driver
-def mark_touching(begin, end, state, facts, key, through, size, parted, side, mark):
-    """mark[i] = 1 for exposed particles and debris, else 0; size[i] [m] of a particle; side[i] = number of its body;
-    parted[i] as solid/kernels/bonds.py has it.
+# ---- who may touch ---------------------------------------------------------------------------------------------------
 
-    through (bodies,): the axes, as bits, along which a body goes on behind a symmetry plane; an image at a plane where
-    its body ends belongs to another one.
+
+@driver
+def mark_exposed(begin, end, state, payload, key, continued, size, rupture_length, side, mark):
+    """mark[i] = 1 for exposed particles and debris, else 0; size[i], rupture_length[i] and side[i] = size, rupture
+    length and body of `Contacts`.
+
+    continued (bodies,): the axes, as bits, along which a body goes on behind a symmetry plane; an image at a plane
+    where its body ends belongs to another one.
     """
     for i in range(begin, end):
-        own = int(facts[i, BODY])
-        beyond = key[i] % IMAGES & (IMAGES - 1 - through[own]) > 0
+        own = int(payload[i, BODY])
+        beyond = key[i] % IMAGES & (IMAGES - 1 - continued[own]) > 0
         size[i] = side_of_cube(state[i, MASS] / state[i, DENSITY])
-        parted[i] = facts[i, PARTED]
-        side[i] = own + (len(through) if beyond else 0)
-        mark[i] = 1 if facts[i, EXPOSED] > 0.0 or facts[i, DEBRIS] > 0.0 else 0
-
-
-@driver
-def remember(begin, end, rows, key, facts, position, size, who, place, size_then):
-    """What still_valid() compares later of the particles `rows`."""
-    for r in range(begin, end):
-        i = rows[r]
-        who[r] = 2 * key[i] + (1 if facts[i, DEBRIS] > 0.0 else 0)
-        size_then[r] = size[i]
-        for d in static_range(DIMENSIONS):
-            place[r, d] = position[i, d]
-
-
-@driver
-def mark_invalid(begin, end, skin, rows, key, facts, position, size, who, place, size_then, mark):
-    """mark[r] = 1 where row r is another particle than it was, or has come closer to others than half its `skin`."""
-    for r in range(begin, end):
-        i = rows[r]
-        x = tuple(position[i, d] - place[r, d] for d in static_range(DIMENSIONS))
-        closer = sqrt(dot(x, x)) + 0.5 * (size[i] - size_then[r])
-        same = who[r] == 2 * key[i] + (1 if facts[i, DEBRIS] > 0.0 else 0)
-        mark[r] = 0 if same and closer <= 0.5 * skin * size_then[r] else 1
+        rupture_length[i] = payload[i, RUPTURE_LENGTH]
+        side[i] = own + (len(continued) if beyond else 0)
+        mark[i] = 1 if payload[i, EXPOSED] > 0.0 or payload[i, DEBRIS] > 0.0 else 0
 
 
 @helper
-def force_between(position, state, reference, size, parted, body, i, j):
+def identity_of(key, payload, i):
+    """A particle's key, and whether it is debris."""
+    return 2 * key[i] + (1 if payload[i, DEBRIS] > 0.0 else 0)
+
+
+@driver
+def remember_search(begin, end, rows, key, payload, position, size, last: SearchMemory):
+    """What mark_outdated() compares later of the particles `rows`."""
+    for r in range(begin, end):
+        i = rows[r]
+        last.identity[r] = identity_of(key, payload, i)
+        last.size[r] = size[i]
+        for d in static_range(DIMENSIONS):
+            last.position[r, d] = position[i, d]
+
+
+@driver
+def mark_outdated(begin, end, skin, rows, key, payload, position, size, last: SearchMemory, mark):
+    """mark[r] = 1 where row r is another particle than it was, or has come closer to others than half its `skin`."""
+    for r in range(begin, end):
+        i = rows[r]
+        x = tuple(position[i, d] - last.position[r, d] for d in static_range(DIMENSIONS))
+        closer = sqrt(dot(x, x)) + 0.5 * (size[i] - last.size[r])
+        same = last.identity[r] == identity_of(key, payload, i)
+        mark[r] = 0 if same and closer <= 0.5 * skin * last.size[r] else 1
+
+
+# ---- forces ----------------------------------------------------------------------------------------------------------
+
+
+@helper
+def force_between(contacts: Contacts, i, j):
     """Contact force on particle i by j. Particles of one body have not touched each other in the reference state, nor
     when their bond was cut: a spring must be pressed before it pushes."""
-    touching = 0.5 * (size[i] + size[j])
-    if body[i] == body[j]:
-        X = difference(reference, 0, i, j)
-        touching = min(SAME_BODY * min(touching, sqrt(dot(X, X))), max(parted[i], parted[j]))
-    densities = (state[i, DENSITY], state[j, DENSITY])
-    speeds = (state[i, SOUND_SPEED], state[j, SOUND_SPEED])
+    touching = 0.5 * (contacts.size[i] + contacts.size[j])
+    if contacts.body[i] == contacts.body[j]:
+        X = difference(contacts.reference, 0, i, j)
+        ruptured = max(contacts.rupture_length[i], contacts.rupture_length[j])
+        touching = min(SAME_BODY * min(touching, sqrt(dot(X, X))), ruptured)
+    densities = (contacts.state[i, DENSITY], contacts.state[j, DENSITY])
+    speeds = (contacts.state[i, SOUND_SPEED], contacts.state[j, SOUND_SPEED])
     moduli = (densities[0] * speeds[0] * speeds[0], densities[1] * speeds[1] * speeds[1])
-    dx, dv = difference(position, 0, i, j), difference(state, VELOCITY, i, j)
+    dx, dv = difference(contacts.position, 0, i, j), difference(contacts.state, VELOCITY, i, j)
     return contact_force(dx, dv, touching, moduli, densities, speeds)
 
 
 @driver
-def touch(
-    begin, end, rows, neighbours, neighbour_count, position, state, reference, size, parted, body, mass, acceleration
-):
-    """Add the contact forces to the acceleration of the particles `rows`, each with its row of `neighbours`, which are
+def accelerate_contacts(begin, end, rows, neighbours: Neighbours, contacts: Contacts, mass, acceleration):
+    """Add the contact forces to the acceleration of the particles `rows`, each with its row of neighbours, which are
     counted among the `rows`."""
     for r in range(begin, end):
         i = rows[r]
-        force = tuple(0.0 for _ in static_range(DIMENSIONS))
-        for n in range(neighbour_count[r]):
-            push = force_between(position, state, reference, size, parted, body, i, rows[neighbours[r, n]])
+        force = zero_vector()
+        for n in range(neighbours.count[r]):
+            push = force_between(contacts, i, rows[neighbours.table[r, n]])
             force = tuple(force[d] + push[d] for d in static_range(DIMENSIONS))
         for d in static_range(DIMENSIONS):
             acceleration[i, d] += force[d] / mass[i]
 
 
 @driver
-def heat_contact(
-    begin, end, rows, neighbours, neighbour_count, position, state, reference, size, parted, body, mass, dt, motion,
-    energy,
-):  # fmt: skip
+def heat_contacts(begin, end, rows, neighbours: Neighbours, contacts: Contacts, mass, dt, motion, energy):
     """Advance the energy by half the work of the contact forces; `motion` (count, D …): means of velocities."""
     for r in range(begin, end):
         i = rows[r]
         power = 0.0
-        for n in range(neighbour_count[r]):
-            j = rows[neighbours[r, n]]
-            push = force_between(position, state, reference, size, parted, body, i, j)
-            power -= 0.5 * dot(push, difference(motion, 0, i, j))
+        for n in range(neighbours.count[r]):
+            j = rows[neighbours.table[r, n]]
+            power -= 0.5 * dot(force_between(contacts, i, j), difference(motion, 0, i, j))
         energy[i] += dt * power / mass[i]

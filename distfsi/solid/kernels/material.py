@@ -6,7 +6,7 @@ belongs to the material. solid/materials.py declares the tables and columns.
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import COMPONENTS, CONCRETE, DIMENSIONS, FAILS, POLAR_ROTATION
+from distfsi.formulas.symbols import COMPONENTS, CONCRETE, FAILS, POLAR_ROTATION
 from distfsi.formulas.tensors import trace
 from distfsi.solid.formulas.concrete import (
     compacted_strain,
@@ -28,21 +28,10 @@ from distfsi.solid.formulas.strength import (
     von_mises,
     yield_stress,
 )
+from distfsi.solid.kernels.matrices import matrix_of, tensor_of
 
 EOS_CONSTANTS, STRENGTH_CONSTANTS, FAILURE_CONSTANTS, CONCRETE_CONSTANTS = 9, 11, 9, 20  # columns of the tables
 COMPRESSIVE_STRENGTH = 8  # of concrete
-
-
-@helper
-def matrix_of(A, i):
-    """Matrix whose rows lie one after the other in A[i]."""
-    return tuple(tuple(A[i, a * DIMENSIONS + b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
-
-
-@helper
-def tensor_of(A, i):
-    """Symmetric tensor whose components are A[i]."""
-    return tuple(A[i, c] for c in static_range(COMPONENTS))
 
 
 @helper

@@ -1,16 +1,16 @@
-"""Loops over a solid's particles that look at no neighbours: velocities, positions, and what is told about them."""
+"""Loops over a solid's particles that look at no neighbours: velocities, positions, the packed state."""
 
 from distfsi.device.markers import driver
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS
-from distfsi.solid.kernels.pairs import DENSITY, MASS, SMOOTHING, SOUND_SPEED, VELOCITY
+from distfsi.solid.kernels.records import DENSITY, MASS, SMOOTHING, SOUND_SPEED, VELOCITY
 
 WORK, IMPULSE = 0, 1  # columns of what is booked
 
 
 @driver
-def collect_state(begin, end, mass, density, h, sound_speed, velocity, state):
-    """state[i] = what neighbours must know of a particle, in the columns of solid/kernels/pairs.py."""
+def pack_state(begin, end, mass, density, h, sound_speed, velocity, state):
+    """state[i] = what neighbours must know of a particle, in the columns of records.py."""
     for i in range(begin, end):
         state[i, MASS] = mass[i]
         state[i, DENSITY] = density[i]
@@ -41,7 +41,7 @@ def kick(begin, end, dt, mass, fixed, acceleration, velocity, booked):
 
 
 @driver
-def push(begin, end, impulse, mass, fixed, mean, velocity, excess, booked):
+def apply_impulse(begin, end, impulse, mass, fixed, mean, velocity, excess, booked):
     """velocity[i] grows by what the fluid's impulse gives; that of a fixed particle does not.
 
     excess[i] = velocity at which the impulse works beyond the `mean` one with which the particle moved;
@@ -63,7 +63,7 @@ def push(begin, end, impulse, mass, fixed, mean, velocity, excess, booked):
 
 
 @driver
-def average(begin, end, count, velocity, mean):
+def average_velocity(begin, end, count, velocity, mean):
     """mean[i] of the last `count` velocities, when `velocity` is the newest."""
     for i in range(begin, end):
         for d in static_range(DIMENSIONS):
@@ -79,7 +79,7 @@ def move(begin, end, dt, velocity, position, moved):
 
 
 @driver
-def mean_motion(begin, end, state, velocity, motion):
+def pack_motion(begin, end, state, velocity, motion):
     """motion[i] = mean of old and new velocities, then the new one."""
     for i in range(begin, end):
         for d in static_range(DIMENSIONS):

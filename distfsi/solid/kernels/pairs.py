@@ -1,7 +1,6 @@
-"""Loops of the solid: neighbour search and forces; those of the material point are in material.py.
+"""Loops of the updated Lagrangian form: forces and strain of particles that are near each other.
 
-`position` (count, DIMENSIONS) and `state` (count, columns below) hold a rank's own particles first, then its ghosts and
-images. All sums gather: the neighbours of a particle are visited in one order on any number of ranks and threads.
+All sums gather: the neighbours of a particle are visited in one order on any number of ranks and threads.
 """
 
 from distfsi.device.markers import driver, helper
@@ -21,71 +20,28 @@ from distfsi.solid.formulas.pair import (
     whole_stress,
 )
 from distfsi.solid.formulas.smoothing import smoothing_slope
-from distfsi.solid.kernels.material import matrix_of
+from distfsi.solid.kernels.matrices import (
+    difference,
+    matrix_of,
+    matrix_sum,
+    store_matrix,
+    store_vector,
+    tensor_of,
+    zero_matrix,
+    zero_vector,
+)
+from distfsi.solid.kernels.records import (
+    DENSITY,
+    MASS,
+    SMOOTHING,
+    SOUND_SPEED,
+    VELOCITY,
+    Interaction,
+    Neighbours,
+    Particles,
+)
 
-MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)  # columns of `state`
-
-# ---- neighbour search -----------------------------------------------------------------------------------------------
-
-
-@driver
-def find_neighbours(begin, end, position, state, cell, start, order, rows, neighbours, neighbour_count):
-    """neighbours[i] = all particles closer than 2 h_ij, cell by cell in the order of their keys.
-
-    `rows` are the offsets of the rows of three cells around a cell. The count may exceed the table's width; then the
-    table is not complete.
-    """
-    for i in range(begin, end):
-        found = 0
-        for r in range(len(rows)):
-            c = cell[i] + rows[r]
-            for n in range(start[c - 1], start[c + 2]):
-                j = order[n]
-                reach = state[i, SMOOTHING] + state[j, SMOOTHING]
-                dx = difference(position, 0, i, j)
-                if dot(dx, dx) < reach * reach and j != i:
-                    if found < neighbours.shape[1]:
-                        neighbours[i, found] = j
-                    found += 1
-        neighbour_count[i] = found
-
-
-@driver
-def place_among(begin, end, rows, table, count, neighbours, neighbour_count):
-    """The neighbours of the particles `rows`, counted among these, become those of all."""
-    for r in range(begin, end):
-        neighbour_count[rows[r]] = count[r]
-        for n in range(count[r]):
-            neighbours[rows[r], n] = rows[table[r, n]]
-
-
-# ---- pairs ---------------------------------------------------------------------------------------------------------
-
-
-@helper
-def difference(A, column, i, j):
-    """Vector of A[i] minus that of A[j]."""
-    return tuple(A[i, column + d] - A[j, column + d] for d in static_range(DIMENSIONS))
-
-
-@helper
-def no_matrix():
-    """Matrix of zeros."""
-    return tuple(tuple(0.0 for _ in static_range(DIMENSIONS)) for _ in static_range(DIMENSIONS))
-
-
-@helper
-def plus(first, second):
-    """Sum of two matrices."""
-    return tuple(tuple(first[a][b] + second[a][b] for b in static_range(DIMENSIONS)) for a in static_range(DIMENSIONS))
-
-
-@helper
-def store_matrix(A, i, matrix):
-    """A[i] = rows of the matrix, one after the other."""
-    for a in static_range(DIMENSIONS):
-        for b in static_range(DIMENSIONS):
-            A[i, a * DIMENSIONS + b] = matrix[a][b]
+# ---- a pair ----------------------------------------------------------------------------------------------------------
 
 
 @helper
@@ -95,22 +51,23 @@ def along(matrix, dx):
 
 
 @helper
-def pair_geometry(position, state, rates, i, j):
+def pair_geometry(particles: Particles, rates, i, j):
     """dx, slope of W, approach speed and Monaghan's Pi of a pair; `rates`: velocity gradients."""
-    dx = difference(position, 0, i, j)
+    dx = difference(particles.position, 0, i, j)
     distance2 = dot(dx, dx)
-    h = 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING])
+    h = 0.5 * (particles.state[i, SMOOTHING] + particles.state[j, SMOOTHING])
     own, other = matrix_of(rates, i), matrix_of(rates, j)
     seen, dilation = (along(own, dx), along(other, dx)), trace(own) + trace(other)
-    approach, rough = approach_speeds(difference(state, VELOCITY, i, j), dx, seen, dilation, distance2, h)
-    mean_sound = 0.5 * (state[i, SOUND_SPEED] + state[j, SOUND_SPEED])
-    mean_density = 0.5 * (state[i, DENSITY] + state[j, DENSITY])
+    dv = difference(particles.state, VELOCITY, i, j)
+    approach, rough = approach_speeds(dv, dx, seen, dilation, distance2, h)
+    mean_sound = 0.5 * (particles.state[i, SOUND_SPEED] + particles.state[j, SOUND_SPEED])
+    mean_density = 0.5 * (particles.state[i, DENSITY] + particles.state[j, DENSITY])
     return (dx, smoothing_slope(distance2, h), approach, viscosity(approach, rough, mean_sound, mean_density))
 
 
 @helper
 def tension_of(stress, i):
-    """The tension that `correct` left beside the particle's corrected stress."""
+    """The tensile part of the particle's stress, behind its corrected stress."""
     return rows(tuple(stress[i, DIMENSIONS * DIMENSIONS + c] for c in static_range(COMPONENTS)))
 
 
@@ -121,19 +78,25 @@ def repelling(state, i, j, dx, tension):
     return repulsion(dot(dx, dx), h, state[i, DENSITY] * state[j, DENSITY]) * along(tension, dx)
 
 
+# ---- a step ----------------------------------------------------------------------------------------------------------
+
+
 @driver
-def correct(begin, end, position, state, neighbours, neighbour_count, pressure, deviator, correction, stress):
+def correct_gradients(begin, end, particles: Particles, neighbours: Neighbours, pressure, deviator, correction, stress):
     """correction[i] = what makes gradients exact for linear fields; stress[i] = the particle's stress times it and, for
     artificial stress, behind it the tensile part of the stress."""
     for i in range(begin, end):
-        moment = no_matrix()
-        for n in range(neighbour_count[i]):
-            j = neighbours[i, n]
-            dx = difference(position, 0, i, j)
-            slope = smoothing_slope(dot(dx, dx), 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING]))
-            moment = plus(moment, pair_gradient(dx, dx, slope, state[j, MASS] / state[j, DENSITY]))
+        # The gradient of the positions without correction.
+        moment = zero_matrix()
+        for n in range(neighbours.count[i]):
+            j = neighbours.table[i, n]
+            dx = difference(particles.position, 0, i, j)
+            slope = smoothing_slope(dot(dx, dx), 0.5 * (particles.state[i, SMOOTHING] + particles.state[j, SMOOTHING]))
+            volume = particles.state[j, MASS] / particles.state[j, DENSITY]
+            moment = matrix_sum(moment, pair_gradient(dx, dx, slope, volume))
+        # Its inverse corrects gradients, and so the stress in the forces.
         matrix = gradient_correction(moment)
-        sigma = whole_stress(tuple(deviator[i, c] for c in static_range(COMPONENTS)), pressure[i])
+        sigma = whole_stress(tensor_of(deviator, i), pressure[i])
         store_matrix(correction, i, matrix)
         store_matrix(stress, i, product(sigma, matrix))
         if ARTIFICIAL_STRESS:
@@ -143,63 +106,63 @@ def correct(begin, end, position, state, neighbours, neighbour_count, pressure, 
 
 
 @driver
-def press(begin, end, pressure, pushed):
-    """pushed[i] = the pressure where it is none of tension, else 0."""
+def drop_tension(begin, end, pressure, compression):
+    """compression[i] = the pressure where it is none of tension, else 0."""
     for i in range(begin, end):
-        pushed[i] = max(pressure[i], 0.0)
+        compression[i] = max(pressure[i], 0.0)
 
 
 @driver
-def accelerate(
-    begin, end, position, state, neighbours, neighbour_count, rates, stress, acceleration, limits, viscous
-):  # fmt: skip
+def accelerate_pairs(
+    begin, end, particles: Particles, neighbours: Neighbours, rates, stress, acceleration, limits, viscous
+):
     """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow;
     viscous[i] = Pi of each pair."""
     for i in range(begin, end):
-        total = tuple(0.0 for _ in static_range(DIMENSIONS))
+        total = zero_vector()
         fastest = 0.0
         own = matrix_of(stress, i)
-        for n in range(neighbour_count[i]):
-            j = neighbours[i, n]
-            dx, slope, approach, Pi = pair_geometry(position, state, rates, i, j)
+        for n in range(neighbours.count[i]):
+            # Viscosity, and with it artificial stress.
+            j = neighbours.table[i, n]
+            dx, slope, approach, Pi = pair_geometry(particles, rates, i, j)
             viscous[i, n] = Pi
-            densities = state[i, DENSITY] * state[j, DENSITY]
+            densities = particles.state[i, DENSITY] * particles.state[j, DENSITY]
             if ARTIFICIAL_STRESS:
-                Pi += repelling(state, i, j, dx, plus(tension_of(stress, i), tension_of(stress, j)))
-            pull = pair_acceleration(dx, slope, plus(own, matrix_of(stress, j)), densities, Pi)
-            total = tuple(total[d] + state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
+                Pi += repelling(particles.state, i, j, dx, matrix_sum(tension_of(stress, i), tension_of(stress, j)))
+            # The force of the pair.
+            pull = pair_acceleration(dx, slope, matrix_sum(own, matrix_of(stress, j)), densities, Pi)
+            total = tuple(total[d] + particles.state[j, MASS] * pull[d] for d in static_range(DIMENSIONS))
             fastest = max(fastest, approach)
-        for d in static_range(DIMENSIONS):
-            acceleration[i, d] = total[d]
-        limits[i, 0], limits[i, 1] = stable_time(state[i, SMOOTHING], state[i, SOUND_SPEED], fastest, total)
-
-
-# ---- update ---------------------------------------------------------------------------------------------------------
+        store_vector(acceleration, i, total)
+        h, sound_speed = particles.state[i, SMOOTHING], particles.state[i, SOUND_SPEED]
+        limits[i, 0], limits[i, 1] = stable_time(h, sound_speed, fastest, total)
 
 
 @driver
-def heat(
-    begin, end, position, state, neighbours, neighbour_count, viscous, dt, stress, correction, velocity, energy,
-    gradient,
-):  # fmt: skip
-    """Advance the energy (Eq. 5c) and find the velocity gradient; `velocity` is the new one, of all particles.
+def strain_pairs(begin, end, dt, particles: Particles, pairs: Interaction, velocity, energy, gradient):
+    """Advance the energy (Eq. 5c) by `dt` and find the velocity gradient; `velocity` is the new one, of all particles.
 
     The energy takes the mean of the old and the new velocities, so that kinetic and internal energy exchange exactly.
     """
     for i in range(begin, end):
         power = 0.0
-        total = no_matrix()
-        own = matrix_of(stress, i)
-        for n in range(neighbour_count[i]):
-            j = neighbours[i, n]
-            dx, Pi = difference(position, 0, i, j), viscous[i, n]
-            slope = smoothing_slope(dot(dx, dx), 0.5 * (state[i, SMOOTHING] + state[j, SMOOTHING]))
-            before, after = difference(state, VELOCITY, i, j), difference(velocity, 0, i, j)
+        total = zero_matrix()
+        own = matrix_of(pairs.stress, i)
+        for n in range(pairs.neighbours.count[i]):
+            j = pairs.neighbours.table[i, n]
+            dx, Pi = difference(particles.position, 0, i, j), pairs.viscous[i, n]
+            slope = smoothing_slope(dot(dx, dx), 0.5 * (particles.state[i, SMOOTHING] + particles.state[j, SMOOTHING]))
+            # Power of the forces, at the mean velocities.
+            before, after = difference(particles.state, VELOCITY, i, j), difference(velocity, 0, i, j)
             mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
-            densities = state[i, DENSITY] * state[j, DENSITY]
+            densities = particles.state[i, DENSITY] * particles.state[j, DENSITY]
             if ARTIFICIAL_STRESS:
-                Pi += 2.0 * repelling(state, i, j, dx, tension_of(stress, i))  # of viscosity either takes a half
-            power += state[j, MASS] * pair_heating(mean, dx, slope, own, densities, Pi)
-            total = plus(total, pair_gradient(after, dx, slope, state[j, MASS] / state[j, DENSITY]))
+                # Of viscosity either particle takes a half; of its own tension it takes all.
+                Pi += 2.0 * repelling(particles.state, i, j, dx, tension_of(pairs.stress, i))
+            power += particles.state[j, MASS] * pair_heating(mean, dx, slope, own, densities, Pi)
+            # Gradient of the new velocities.
+            volume = particles.state[j, MASS] / particles.state[j, DENSITY]
+            total = matrix_sum(total, pair_gradient(after, dx, slope, volume))
         energy[i] += dt * power
-        store_matrix(gradient, i, mid_step(product(total, matrix_of(correction, i)), dt))
+        store_matrix(gradient, i, mid_step(product(total, matrix_of(pairs.correction, i)), dt))

@@ -153,7 +153,6 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
             for i in range(n):
                 stop_slopes(T, i, seen[faces[first + i]] - 1)
             # fluxes
-            rate = real(2 * DIMENSIONS) * real(dt / grid.spacing[axis])
             faces_of_box = Faces(
                 cell=c,
                 variables=BOX * LANES,
@@ -165,7 +164,7 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
                 flux=0,
                 rows=2 * LANES,
                 axis=axis,
-                rate=rate,
+                rate=real(2 * DIMENSIONS) * real(dt / grid.spacing[axis]),
             )
             face_fluxes(P, T, F, faces_of_box, LANES, LANES)
             for i in range(n):

@@ -7,7 +7,7 @@ from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, PHASES, VARIABLES
 from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, center_of, first_value, index_of
 from distfsi.mesh.kernels.search import Bins, any_particle
-from distfsi.solid.kernels.pairs import DENSITY, MASS, VELOCITY
+from distfsi.solid.kernels.records import DENSITY, MASS, VELOCITY
 
 # Columns of the numbers of cells of each kind that find_depth() counts.
 COVERED_CELLS, DEEP_CELLS, FRESH_CELLS = range(3)

@@ -1,0 +1,150 @@
+"""What kernels of the solid take as one argument: records of arrays, and the columns of packed arrays.
+
+A rank's own particles come first, then its ghosts, then the images at symmetry planes: arrays "of all" have a row for
+each of them, the others a row for each own particle.
+"""
+
+from typing import Any, NamedTuple
+
+# Columns of the packed state of all particles: what neighbours must know of a particle.
+MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)
+
+# Columns of the packed state of bonds: what the forces of bonds need of a particle; behind them its bond stress.
+STIFFNESS, DISPLACEMENT = 0, 1
+
+# Columns of the payload: what ghosts get besides in the total Lagrangian form.
+VOLUME, BODY, DAMAGE, NEIGHBOURHOOD_DAMAGE, DETACHING, EXPOSED, DEBRIS, RUPTURE_LENGTH, STRETCH, CRACK = range(10)
+
+
+class Particles(NamedTuple):
+    """All particles: position (count, D) [m] and packed state (count, VELOCITY + D)."""
+
+    position: Any
+    state: Any
+
+
+class Neighbours(NamedTuple):
+    """A table (n, width) of the neighbours of each particle, and how many it has (n,)."""
+
+    table: Any
+    count: Any
+
+
+class Interaction(NamedTuple):
+    """Pairs of particles after their forces are known, in the updated Lagrangian form.
+
+    neighbours  of the own particles
+    viscous     (n, width) Monaghan's Pi of each pair
+    stress      (count, ...) corrected stress and, for artificial stress, tension behind it, of all particles
+    correction  (n, D D) of the gradients
+    """
+
+    neighbours: Neighbours
+    viscous: Any
+    stress: Any
+    correction: Any
+
+
+class Bodies(NamedTuple):
+    """Of each body (bodies,): spacing [m] and smoothing length [m] in the reference state."""
+
+    spacing: Any
+    smoothing: Any
+
+
+class Bonds(NamedTuple):
+    """The bonds of the own particles, in the order of their partners' keys.
+
+    count     (n,) how many a particle has
+    partner   (n, width) row of each partner
+    geometry  (n, width (D + 1)) vector g and weight w of each bond (solid/formulas/bonds.py)
+    """
+
+    count: Any
+    partner: Any
+    geometry: Any
+
+
+class Fit(NamedTuple):
+    """What the bonds tell of a particle: gradient correction and deformation gradient (n, D D), by rows."""
+
+    correction: Any
+    deformation: Any
+
+
+class Cohesion(NamedTuple):
+    """How well the own particles hold together (n,): see the columns of solid/total_lagrangian.py."""
+
+    bond_count: Any
+    detaching: Any
+    exposed: Any
+    neighbourhood_damage: Any
+    rupture_length: Any
+    crack: Any
+
+
+class Volumes(NamedTuple):
+    """Mass [kg], density [kg/m3], reference volume [m^D] and logarithm of the growth by voids of the own particles."""
+
+    mass: Any
+    density: Any
+    volume: Any
+    void: Any
+
+
+class BondedMaterial(NamedTuple):
+    """What the forces of bonds need of the material of the own particles."""
+
+    density: Any
+    sound_speed: Any
+    plastic_strain: Any
+    deviator: Any
+    pressure: Any
+    viscous_pressure: Any
+
+
+class BondedPoint(NamedTuple):
+    """What the strain of bonds needs of the own particles (n,)."""
+
+    volume: Any
+    mass: Any
+    h: Any
+    density: Any
+    sound_speed: Any
+    neighbourhood_damage: Any
+
+
+class StrainResult(NamedTuple):
+    """What the strain of bonds changes of the own particles."""
+
+    energy: Any
+    viscous_pressure: Any
+    gradient: Any
+    detaching: Any
+
+
+class Contacts(NamedTuple):
+    """All particles, as contact sees them.
+
+    position        (count, D) [m]
+    state           (count, VELOCITY + D) packed
+    reference       (count, D) [m] positions in the reference state
+    size            (count,) [m] side of a cube of the particle's volume
+    rupture_length  (count,) [m] of the shortest bond that a particle has lost
+    body            (count,) number of the body, another one for images behind a plane at which the body ends
+    """
+
+    position: Any
+    state: Any
+    reference: Any
+    size: Any
+    rupture_length: Any
+    body: Any
+
+
+class SearchMemory(NamedTuple):
+    """The particles that were looked at in the last search for contacts: who (m,), where (m, D) [m], how large (m,)."""
+
+    identity: Any
+    position: Any
+    size: Any
