@@ -81,6 +81,9 @@ def _check_waves(law, material, rho, p):
         energy = six_equation.energy_behind_wave(p, behind / rho, excess, after, omega_behind)
         size = abs(after) + factor * p
         assert after + omega_behind * energy == pytest.approx(factor * p, abs=1e-9 * size)
+    behind_wave = formula(model_of(law, AIR), six_equation.behind_wave)
+    for u_face in (-500.0, 500.0, 990.0, 999.0):  # up to compressions that no gas can have
+        assert np.all(np.isfinite(behind_wave((rho, 1.0, 0.0, p, 0.5), 1000.0, u_face)))
 
 
 def check_relaxation(law, material, rho, p):

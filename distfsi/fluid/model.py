@@ -26,9 +26,8 @@ RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost l
     "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
     "weno5": (reconstruction.weno5, limiters.van_leer, 3),
 }
-RIEMANN_SOLVERS: dict[
-    str, tuple[Callable[..., Any], ...]
-] = {  # bounding speeds, diffusion across contacts, viscosity along faces
+# bounding speeds, diffusion across contacts, viscosity along faces
+RIEMANN_SOLVERS: dict[str, tuple[Callable[..., Any], ...]] = {
     "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
     "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),

@@ -9,7 +9,7 @@ from math import sqrt
 
 from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_change
 from distfsi.fluid.formulas.riemann import contact_speed
-from distfsi.fluid.formulas.stiffness import weight_1, weight_2
+from distfsi.fluid.formulas.stiffness import held_compression_1, held_compression_2, weight_1, weight_2
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
     BODY_FORCE,
@@ -127,16 +127,16 @@ def behind_wave(W, s, u_face):
     rho = a1 * W[0] + a2 * W[1]
     chi = (s - u) / (s - u_face)  # compression; 1 if no wave passes
     energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
-    rho1, rho2 = chi * W[0], chi * W[1]
+    chi1, chi2 = held_compression_1(chi, W[0]), held_compression_2(chi, W[1])
     before1, slope1 = reference_1(W[0])
     before2, slope2 = reference_2(W[1])
-    behind1, slope1b = reference_1(rho1)
-    behind2, slope2b = reference_2(rho2)
+    behind1, slope1b = reference_1(chi1 * W[0])
+    behind2, slope2b = reference_2(chi2 * W[1])
     omega1, omega_slope1 = grueneisen_1(W[0])
     omega2, omega_slope2 = grueneisen_2(W[1])
-    omega1b, omega_slope1b = grueneisen_1(rho1)
-    omega2b, omega_slope2b = grueneisen_2(rho2)
-    mass1, mass2 = a1 * rho1, a2 * rho2
+    omega1b, omega_slope1b = grueneisen_1(chi1 * W[0])
+    omega2b, omega_slope2b = grueneisen_2(chi2 * W[1])
+    mass1, mass2 = a1 * (chi * W[0]), a2 * (chi * W[1])
     mass = mass1 + mass2
     return (
         mass1,
@@ -145,8 +145,8 @@ def behind_wave(W, s, u_face):
         *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
         energy,
         a1,
-        a1 * energy_behind_wave(p, chi, omega1b / omega1 * (p - before1), behind1, omega1b),
-        a2 * energy_behind_wave(p, chi, omega2b / omega2 * (p - before2), behind2, omega2b),
+        a1 * energy_behind_wave(p, chi1, omega1b / omega1 * (p - before1), behind1, omega1b),
+        a2 * energy_behind_wave(p, chi2, omega2b / omega2 * (p - before2), behind2, omega2b),
         1.0,
     )
 

@@ -10,6 +10,8 @@ Of ideal, stiffened, Noble-Abel and Noble-Abel stiffened gas P is a constant.
 
 from distfsi.formulas.symbols import grueneisen_1, grueneisen_2
 
+ROOM = 0.95  # of the compression at which a gas has no room: where it is held
+
 
 def weight_1(rho):
     """g of phase 1."""
@@ -33,3 +35,15 @@ def exponent_2(rho):
     """g + omega of phase 2."""
     omega, slope = grueneisen_2(rho)
     return weight_2(rho) + omega
+
+
+def held_compression_1(chi, rho):
+    """A compression chi of phase 1, held where a Noble-Abel gas with its g would soon have no room."""
+    omega, slope = grueneisen_1(rho)
+    return chi if slope == 0.0 else min(chi, 1.0 + ROOM / max(weight_1(rho) - 1.0, 1e-30))
+
+
+def held_compression_2(chi, rho):
+    """The same of phase 2."""
+    omega, slope = grueneisen_2(rho)
+    return chi if slope == 0.0 else min(chi, 1.0 + ROOM / max(weight_2(rho) - 1.0, 1e-30))
