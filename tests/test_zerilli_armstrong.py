@@ -48,8 +48,8 @@ def test_a_cycle_of_shear_follows_the_independent_integration(metal, density):
         log_rate = (math.log(max(activated, 1e-300)) / temperature + metal.C3) / metal.C4
         flow = math.exp(min(log_rate, 40.0)) if log_rate > math.log(metal.minimum_rate) else 0.0
         heating = metal.taylor_quinney * math.sqrt(3.0) * abs(tau) * flow / (density * metal.heat_capacity)
-        return [sign * metal.shear_modulus * rate - math.copysign(math.sqrt(3.0) * metal.shear_modulus * flow, tau),
-                flow, heating]  # fmt: skip
+        back = math.copysign(math.sqrt(3.0) * flow, tau)
+        return [metal.shear_modulus * (sign * rate - back), flow, heating]
 
     y = [0.0, 0.0, 293.0]
     for sign, duration in ((1.0, 8e-6), (-1.0, 12e-6)):
