@@ -619,6 +619,17 @@ class Softer(Spring):
         return HALF * (x - self.rest)
 
 
+@dataclass(frozen=True)
+class Nothing:
+    """A law without numbers."""
+
+    def force(self, x):
+        return self.half(x)
+
+    def half(self, x):
+        return HALF * x
+
+
 class Memory(NamedTuple):
     """What a material remembers: the scene says what that is."""
 
@@ -743,6 +754,19 @@ def test_records_are_made_where_they_are_handed_on():
 def test_a_record_has_all_fields_and_the_class_of_its_parameter(function, why):
     with pytest.raises(NotInSubset, match=why):
         text_of(function)
+
+
+@driver
+def push(begin, end, out):
+    for i in range(begin, end):
+        law = tuple(0.0 for _ in static_range(N))
+        out[i] = first_material(law, out[i])
+
+
+def test_a_law_may_have_no_numbers():
+    out = np.array([3.0])
+    cpu.build([push], {"N": 0}, {"first_material": Bound.from_table(Nothing, "force")}).push(0, 1, out)
+    assert out.tolist() == [Nothing().force(3.0)]
 
 
 def test_the_scene_chooses_a_record_whose_fields_have_numbers():

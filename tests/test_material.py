@@ -1,13 +1,17 @@
 """The material point as a whole: `deform` driven through strain histories, against exact and independent answers."""
 
+import itertools
 import math
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from distfsi.device import cpu
-from distfsi.device.interface import Columns
+from distfsi.device.emit import plain
+from distfsi.laws.law import DAMAGE, Failure, SolidEos, Strength
+from distfsi.laws.registry import laws_of
 from distfsi.laws.solid.eos.compaction import Compaction
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
@@ -18,10 +22,9 @@ from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.laws.solid.strength.linear_hardening import LinearHardening
 from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
-from distfsi.scene import description as d
-from distfsi.solid.formulas import concrete, damage, strength
-from distfsi.solid.kernels.material import deform
-from distfsi.solid.materials import Materials, concrete_constants, crack_width, weibull
+from distfsi.solid.formulas import stress
+from distfsi.solid.materials import crack_width, weibull
+from material_point import Point, Points, body_of, von_mises
 
 STEEL = JohnsonCook(77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
 STEEL_EOS = LinearEos(160e9)
@@ -31,38 +34,51 @@ WIDTH = crack_width(1.3, 3)  # spacings
 TENSION, SHEAR = np.diag([1.0, 0.0, 0.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-class Point:
-    """One or more particles of one material that are strained together."""
-
-    def __init__(self, eos, strength, density=7830.0, failure=None, spacing=1e-3, rate="jaumann", count=1, D=3):
-        shape = d.Ball((0.0,) * D, 1.0)
-        body = d.Body("body", shape, spacing, density, (0.0,) * D, eos, strength, None, failure)
-        materials = Materials(d.Solid((body,), 1.3, 1.0, 2.0, rate), D)
-        constants = {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2} | materials.constants
-        self.deform, self.tables = cpu.build((deform,), constants).deform, materials.tables
-        self.body, ids = np.zeros(count, dtype=int), np.arange(count)
-        columns = materials.initial(self.body, ids, np.full(count, spacing**D))
-        columns |= {"energy": np.zeros(count), "density": np.full(count, density), "h": np.full(count, 1e-3)}
-        self.columns = Columns(cpu.Team(1), columns)
-        self.state = materials.state(self.columns)
-        self.strain(0.0, np.zeros((D, D)))
-
-    def strain(self, dt, gradient):
-        rates = np.tile(np.ascontiguousarray(gradient, dtype=float).ravel(), (len(self.body), 1))
-        self.deform(0, len(self.body), dt, rates, self.body, *self.tables, *self.state)
-        return self
-
-    def __getattr__(self, name):
-        return self.columns[name]
-
-    @property
-    def normal_stress(self):
-        """Along x [Pa], tension positive."""
-        return self.deviator[:, 0] - self.pressure
+# ---- laws side by side -----------------------------------------------------------------------------------------------
 
 
-def von_mises(S):
-    return math.sqrt(1.5 * (S[:3] @ S[:3] + 2.0 * S[3:] @ S[3:]))
+def test_bodies_of_different_laws_have_the_bits_that_they_have_alone():
+    """Metals, one of them breaking and of which one is twice there, beside concrete: each by the kernel of its laws."""
+    failure = JohnsonCookFailure(0.05, 0.0, 0.0, 0.0, 0.0, 1.0, None, 1e3, Scatter(8.0, 1e-3, 1))
+    bodies = [
+        body_of(STEEL_EOS, STEEL, failure=failure),
+        body_of(HJC_EOS, HJC, 2440.0),
+        body_of(STEEL_EOS, replace(STEEL, A=300e6), failure=failure),
+        body_of(STEEL_EOS, Elastic(77e9)),
+    ]
+    together = Points(bodies, [2, 0, 1, 3, 0])
+    alone = [Points([bodies[b]], [0] * 5) for b in (2, 0, 1, 3, 0)]
+    random = np.random.default_rng(7)
+    mean = random.standard_normal((5, 3, 3))
+    mean[1], mean[2] = np.diag([1.0, -0.5, -0.5]), -np.eye(3)
+    for _ in range(200):
+        gradient = 5e4 * (mean + 0.3 * random.standard_normal((5, 3, 3)))
+        for points in (together, *alone):
+            points.strain(1e-8, gradient)
+    assert [len(group.rows) for group in together.groups.groups] == [3, 1, 1]
+    for row, points in enumerate(alone):
+        for name, column in points.columns.items():
+            if name != "body":
+                assert np.array_equal(together.columns[name][row], column[row]), name
+    assert together.columns["damage"][1] > 0.0
+    assert together.columns["peak_compression"][2] > 0.0
+
+
+def test_what_the_laws_of_a_scene_do_not_use_is_not_stored():
+    always = {"body", "h", "energy", "density", "deviator", "pressure", "sound_speed"}
+    assert set(Point(STEEL_EOS, Elastic(77e9)).columns) == always
+    assert set(Point(STEEL_EOS, PerfectlyPlastic(77e9, 4e8)).columns) == always | {"plastic_strain"}
+    whole = Point(HJC_EOS, HJC, 2440.0, PrincipalStress(3.6e6, 80.0, None), rate="green_naghdi")
+    concrete = {"plastic_strain", "accumulated_damage", "peak_compression", "damage", "stretch"}
+    assert set(whole.columns) == always | concrete
+
+
+def test_laws_of_different_kinds_remember_different_things():
+    named = {kind: {c.name for law in laws_of(kind) for c in law.columns} for kind in (SolidEos, Strength, Failure)}
+    for first, second in itertools.combinations(named.values(), 2):
+        assert not first & second
+    for law in laws_of(Failure):
+        assert law.columns[0] == DAMAGE
 
 
 # ---- plastic flow ----------------------------------------------------------------------------------------------------
@@ -72,7 +88,7 @@ def von_mises(S):
 def test_a_cycle_of_shear_follows_the_independent_integration():
     """Forth, back and forth again at 1e4/s: rate form of Johnson-Cook with heating, integrated by scipy."""
     point, rate, dt = Point(STEEL_EOS, STEEL), 1e4, 2e-9
-    G, A, B, n, C, m, _, room, melt, capacity, taylor_quinney = point.tables[1][0]
+    G, A, B, n, C, m, _, room, melt, capacity, taylor_quinney = astuple(STEEL)
 
     def rates(time, y, sign):
         """Of shear stress, plastic strain and temperature: the overstress says how fast it flows."""
@@ -133,7 +149,7 @@ def test_shear_fails_at_the_fracture_strain_and_not_before():
     while point.plastic_strain[0] < 0.1999:
         point.strain(1e-8, 1e4 * (SHEAR + SHEAR.T))
         assert point.damage[0] == 0.0
-    assert point.wear[0] == pytest.approx(point.plastic_strain[0] / 0.2, rel=1e-12)
+    assert point.ductile_damage[0] == pytest.approx(point.plastic_strain[0] / 0.2, rel=1e-12)
     while point.plastic_strain[0] < 0.2:
         point.strain(1e-8, 1e4 * (SHEAR + SHEAR.T))
     assert point.damage[0] == 1.0
@@ -150,11 +166,9 @@ def test_shear_fails_at_the_fracture_strain_and_not_before():
     ],
 )
 def test_johnson_cook_fracture_strain(triaxiality, rate, temperature, strain):
-    compiled = cpu.build((damage.failure_strain, strength.homologous_temperature), {"DIMENSIONS": 3, "COMPONENTS": 6})
-    steel = (77e9, 792e6, 510e6, 0.26, 0.014, 1.03, 1.0, 273.0, 1793.0, 477.0, 0.9)
-    heat = compiled.homologous_temperature(temperature, steel)
-    failure = (0.05, 3.44, -2.12, 0.002, 0.61, 1.0, math.inf, 0.0, 1e-3)
-    assert compiled.failure_strain(triaxiality, rate, heat, failure) == pytest.approx(strain, rel=1e-12)
+    failure = JohnsonCookFailure(0.05, 3.44, -2.12, 0.002, 0.61, 1.0, None, 0.0, None)
+    heat = STEEL.scaled_temperature(temperature)
+    assert failure.fracture_strain(triaxiality, rate, heat) == pytest.approx(strain, rel=1e-12)
 
 
 def test_crushing_uses_nothing_up():
@@ -163,7 +177,7 @@ def test_crushing_uses_nothing_up():
     for _ in range(1000):
         point.strain(1e-8, -2e4 * TENSION)
     assert point.plastic_strain[0] > 0.1
-    assert (point.wear[0], point.damage[0]) == (0.0, 0.0)
+    assert (point.ductile_damage[0], point.damage[0]) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("spacing", [0.25e-3, 0.5e-3, 1e-3])
@@ -174,7 +188,7 @@ def test_a_crack_takes_its_energy_at_any_spacing(spacing):
     point = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing)
     work = 0.0
     while point.damage[0] < 1.0:
-        before, worn = point.deviator[0, 3], point.wear[0] >= 1.0
+        before, worn = point.deviator[0, 3], point.ductile_damage[0] >= 1.0
         point.strain(dt, rate * 0.5 * (SHEAR + SHEAR.T))
         work += worn * 0.5 * (before + point.deviator[0, 3]) * rate * dt
     assert work * WIDTH * spacing == pytest.approx(energy, rel=0.01)
@@ -186,7 +200,7 @@ def test_a_ductile_crack_takes_its_energy_where_it_cannot_contract(spacing):
     energy, dt, width = 2e4, 2e-9, WIDTH * spacing
     failure = JohnsonCookFailure(D1=0.2, D2=0.0, fracture_energy=energy, **NO_RATE)
     point, work = Point(STEEL_EOS, PerfectlyPlastic(77e9, 400e6), failure=failure, spacing=spacing), 0.0
-    point.wear[:] = 1.0
+    point.ductile_damage[:] = 1.0
     while point.damage[0] < 1.0:
         before, density = point.normal_stress[0], point.density[0]
         point.strain(dt, 1e5 * TENSION)
@@ -226,7 +240,7 @@ def test_a_failed_particle_carries_pressure_only():
 @pytest.mark.parametrize("D", [1, 2, 3])
 def test_the_largest_principal_value_of_a_deviator(D):
     largest = cpu.build(
-        (damage.largest_principal,), {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2}
+        (stress.largest_principal,), {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2}
     ).largest_principal
     random = np.random.default_rng(5)
     for case in range(300):
@@ -299,15 +313,18 @@ def test_crushed_concrete_unloads_along_a_stiffer_line():
 
 
 def test_strength_of_concrete():
-    stone = concrete_constants(HJC_EOS, HJC, cracks=False)
-    strength = cpu.build((concrete.concrete_strength,), {}).concrete_strength
-    assert strength(0.0, 1.0, 0.0, stone) == pytest.approx(0.79 * 48e6)
-    assert strength(48e6, 1.0, 0.0, stone) == pytest.approx((0.79 + 1.6) * 48e6)
-    assert strength(48e6, 1e3, 0.0, stone) == pytest.approx((0.79 + 1.6) * (1.0 + 0.007 * math.log(1e3)) * 48e6)
-    assert strength(48e6, 1.0, 1.0, stone) == pytest.approx(1.6 * 48e6)
-    assert strength(5e9, 1.0, 0.0, stone) == pytest.approx(7.0 * 48e6)
-    assert strength(-2e6, 1.0, 0.0, stone) == pytest.approx(0.5 * 0.79 * 48e6)
-    assert strength(-4e6, 1.0, 0.0, stone) == strength(-1e6, 1.0, 1.0, stone) == 0.0
+    whole = plain(Concrete.yield_stress, {"FAILS": False})
+
+    def strength(pressure, rate, damage):
+        return whole(*astuple(HJC), pressure, rate, damage)
+
+    assert strength(0.0, 1.0, 0.0) == pytest.approx(0.79 * 48e6)
+    assert strength(48e6, 1.0, 0.0) == pytest.approx((0.79 + 1.6) * 48e6)
+    assert strength(48e6, 1e3, 0.0) == pytest.approx((0.79 + 1.6) * (1.0 + 0.007 * math.log(1e3)) * 48e6)
+    assert strength(48e6, 1.0, 1.0) == pytest.approx(1.6 * 48e6)
+    assert strength(5e9, 1.0, 0.0) == pytest.approx(7.0 * 48e6)
+    assert strength(-2e6, 1.0, 0.0) == pytest.approx(0.5 * 0.79 * 48e6)
+    assert strength(-4e6, 1.0, 0.0) == strength(-1e6, 1.0, 1.0) == 0.0
 
 
 def test_shear_wears_concrete_out_and_leaves_friction():
@@ -316,7 +333,7 @@ def test_shear_wears_concrete_out_and_leaves_friction():
     pressure = hydrostat(point, 0.0008)
     worn = 0.04 * (pressure + 4e6) / 48e6
     start = point.plastic_strain[0]
-    while point.wear[0] < 1.0:
+    while point.accumulated_damage[0] < 1.0:
         point.strain(1.0, 1e-5 * (SHEAR + SHEAR.T))
         point.density[:] = 2440.0 * 1.0008
     assert point.plastic_strain[0] - start == pytest.approx(max(worn, 0.01), rel=0.01)

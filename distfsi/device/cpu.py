@@ -22,7 +22,7 @@ __all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
 def build(
     drivers: Iterable[Callable],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound] | None = None,
+    bindings: Mapping[str, Bound | type] | None = None,
     real: str = "float64",
 ) -> SimpleNamespace:
     """Each driver, specialised for a scene.

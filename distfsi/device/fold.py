@@ -308,7 +308,7 @@ class Fold(ast.NodeTransformer):
         tree.decorator_list, tree.returns = [], None
         self.records = {name: class_ for name, class_ in self.source.parameters.items() if class_ is not None}
         flat = {name: self.flat_parameters(name, class_) for name, class_ in self.source.parameters.items()}
-        self.parameters = {name: class_ for name, class_ in self.source.parameters.items() if flat[name]}
+        self.parameters = {n: class_ for n, class_ in self.source.parameters.items() if not self.is_fixed(n, class_)}
         names = [name for each in flat.values() for name in each]
         tree.args.args = [ast.arg(name) for name in names]
         sometimes = (ast.For, ast.While, ast.AugAssign, *((ast.If,) if self.in_kernel else ()))
@@ -326,6 +326,10 @@ class Fold(ast.NodeTransformer):
         if record is None:
             return [name]
         return [flat for flat in flat_names(name, record) if not self.is_given(name, flat)]
+
+    def is_fixed(self, name: str, record: type | None) -> bool:
+        """Whether the scene gives all fields of a record, so that it is no parameter."""
+        return record is not None and len(fields_of(record)) > 0 and not self.flat_parameters(name, record)
 
     def is_given(self, name: str, flat: str) -> bool:
         """Whether the scene gives the field of a record."""
@@ -615,7 +619,7 @@ class Fold(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call):
         if isinstance(node.func, ast.Attribute) and self.record_of(node.func.value):
-            if self.flat_parameters(*self.record_of(node.func.value)):
+            if not self.is_fixed(*self.record_of(node.func.value)):
                 node.args.insert(0, node.func.value)
             node.func = ast.Name(ast.unparse(node.func), ast.Load())  # a formula of a law
         if made := self.made_record(node):

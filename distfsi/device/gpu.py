@@ -89,7 +89,7 @@ class Gpu:
         self,
         drivers: Iterable[Callable],
         constants: Mapping[str, object],
-        bindings: Mapping[str, Bound] | None = None,
+        bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",
     ) -> SimpleNamespace:
         """The drivers as kernels; each is compiled at its first call."""

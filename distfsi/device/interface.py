@@ -36,7 +36,7 @@ class Device(Protocol):
         self,
         drivers: Iterable[Callable],
         constants: Mapping[str, object],
-        bindings: Mapping[str, Bound] | None = None,
+        bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",
     ) -> SimpleNamespace:
         """The drivers, specialised for a scene, under their own names. Raises NotInSubset."""

@@ -29,8 +29,9 @@ class LawTable(Mirror):
 def table_of(law: type[Law], key: str | None = None, word: str | None = None) -> type[LawTable]:
     """The table of a law; where there are several `key` = `word` chooses this one."""
     types = get_type_hints(law)
+    given = [each for each in fields(law) if each.init]
     entries: dict[str, Any] = {key: (Literal[word], ...)} if key else {}
-    entries |= {each.name: _field(types[each.name], each.metadata["entry"]) for each in fields(law)}
+    entries |= {each.name: _field(types[each.name], each.metadata["entry"]) for each in given}
     summary = (law.__doc__ or "").partition("\n\n")[0]
     table = create_model(law.__name__, __base__=LawTable, __doc__=summary, __module__=__name__, **entries)
     table.describes, table.word = law, key or ""

@@ -1,173 +1,166 @@
-"""The materials of a scene's bodies: constants for the formulas in physics/, and what each particle remembers.
+"""The materials of a scene's bodies: which laws they follow, with which numbers, and what each particle remembers.
 
-A form of the solid (updated or total Lagrangian) allocates, moves, keeps and writes the columns that `columns` names,
-and calls `kernels.deform(begin, end, dt, gradient, body, *tables, *state(columns))` with the velocity gradient at
-mid-step. Stresses are then those that a particle carries, damage included: forces need no further factor. Damage 1
-means failed: no tension and no shear are left (closed cracks in concrete carry friction), and bonds are to be cut.
+Bodies of the same laws are one material, however their numbers differ: kernels are specialised for the laws of a
+material, and find its numbers in tables with a row per body.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.interface import Columns
-from distfsi.laws.law import Failure, SolidEos, Strength
-from distfsi.laws.solid.eos.compaction import Compaction
-from distfsi.laws.solid.eos.linear import LinearEos
-from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
-from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
-from distfsi.laws.solid.failure.principal_stress import PrincipalStress
+from distfsi.device.fold import Bound
+from distfsi.laws.law import Column, Failure, Law, SolidEos, Strength
 from distfsi.laws.solid.scatter import Scatter
-from distfsi.laws.solid.strength.concrete import Concrete
-from distfsi.laws.solid.strength.elastic import Elastic
-from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
-from distfsi.laws.solid.strength.linear_hardening import LinearHardening
-from distfsi.laws.solid.strength.none import NoStrength
-from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from distfsi.scene.description import Body, Solid
-from distfsi.solid.formulas.concrete import dense_pressure
 from distfsi.solid.formulas.smoothing import smoothing_slope
+from distfsi.solid.kernels.records import LawTables, RestState
 
-ROOM_TEMPERATURE = 293.15  # K, of materials that do not know their own
-NOT_CONCRETE = (0.0,) * 20
-NO_FAILURE = (math.inf, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0)
+SCATTER = Column("strength_scatter", "1", "factor of the strength of the particle", initial=1.0, written=False)
+PRESSURE = Column("pressure", "Pa", "pressure that is carried")
+MINIMUM_MODULUS = 0.1  # of the bulk modulus at rest, which expanded hot material keeps
 
 
 @dataclass(frozen=True)
-class Column:
-    """What each particle remembers under `name`: so many numbers (0: one, as a flat array), `unit` for the output
-    (None: not written), and how it turns when it is mirrored: "scalar" or "tensor"."""
+class Material:
+    """The laws that bodies follow; `scattered`: their strength differs from particle to particle."""
 
-    name: str
-    width: int
-    unit: str | None
-    kind: str = "scalar"
+    eos: type[SolidEos]
+    strength: type[Strength]
+    failure: type[Failure] | None
+    scattered: bool
+
+    @classmethod
+    def of(cls, body: Body) -> Material:
+        """The laws of a body."""
+        failure = body.failure
+        scattered = failure is not None and failure.scatter is not None
+        return cls(type(body.eos), type(body.strength), type(failure) if failure else None, scattered)
+
+    @property
+    def laws(self) -> dict[str, type[Law]]:
+        """The laws by their kind: eos, strength and, if the material can fail, failure."""
+        return {name: getattr(self, name) for name in LawTables._fields if getattr(self, name)}
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """What each particle remembers for its laws."""
+        return tuple(column for law in self.laws.values() for column in law.columns)
+
+    @property
+    def memory(self) -> tuple[type[NamedTuple], ...]:
+        """Records of what is remembered for each of the laws, in the order of the kernel's arguments."""
+        return tuple(self._memory(name) for name in LawTables._fields)
+
+    def _memory(self, name: str) -> type[NamedTuple]:
+        columns = self.laws[name].columns if name in self.laws else ()
+        return NamedTuple(f"{name.capitalize()}Memory", [(column.name, float) for column in columns])
+
+    @property
+    def constants(self) -> dict[str, object]:
+        """What the kernels of this material are specialised for, beside what all are."""
+        sizes = {}
+        for name in LawTables._fields:
+            law = self.laws.get(name)
+            sizes[f"{name.upper()}_FIELDS"] = len(fields(law)) if law else 0
+            sizes[f"{name.upper()}_COLUMNS"] = len(law.columns) if law else 0
+        return sizes | {"FAILS": self.failure is not None, "SCATTERED": self.scattered}
+
+    @property
+    def bindings(self) -> dict[str, Bound | type]:
+        """The formulas of the laws, and the records of what is remembered."""
+        bound = {f"{name}_response": Bound.from_table(law, "respond") for name, law in self.laws.items()}
+        bound["free_swelling"] = Bound.from_table(self.eos, "free_swelling")
+        for formula in ("elastic_density", "carried_share", "homologous_temperature"):
+            bound[formula] = Bound.from_table(self.strength, formula)
+        return bound | {record.__name__: record for record in self.memory}
 
 
 class Materials:
     """The materials of a solid.
 
-    constants  what the kernels are specialised with
-    tables     eos, strength, failure, concrete: one row of constants per body
-    columns    what each particle remembers beside density, h and energy
+    materials  without repetition, in the order of the bodies
+    number     (bodies,) which of them each body has
+    rest       of each body, on the host
+    constants  what all kernels of the solid are specialised for
+    columns    what particles remember, of all materials; a particle of another material keeps what it had at the start
     """
 
     def __init__(self, solid: Solid, dimensions: int):
         self.bodies, self.dimensions = solid.bodies, dimensions
-        self._crack_width = crack_width(solid.smoothing, dimensions)
-        self.tables = tuple(
-            np.array([row(body) for body in solid.bodies])
-            for row in (_eos_row, lambda body: strength_constants(body.strength), self._failure_row, _concrete_row)
-        )
+        of_bodies = [Material.of(body) for body in solid.bodies]
+        self.materials = tuple(dict.fromkeys(of_bodies))
+        self.number = np.array([self.materials.index(material) for material in of_bodies])
+        self.rest = rest_state(solid.bodies, crack_width(solid.smoothing, dimensions))
+        self.columns = self._columns()
+        names = {column.name for column in self.columns}
         self.constants = {
             "POLAR_ROTATION": solid.objective_rate == "green_naghdi",
             "FAILS": any(body.failure for body in solid.bodies),
-            "CONCRETE": any(isinstance(body.strength, Concrete) for body in solid.bodies),
+            "YIELDS": "plastic_strain" in names,
         }
-        self.columns = self._columns()
-
-    def _failure_row(self, body: Body) -> tuple[float, ...]:
-        return failure_constants(body.failure, self._crack_width * body.spacing)
 
     def _columns(self) -> tuple[Column, ...]:
-        components = self.dimensions * (self.dimensions + 1) // 2
-        columns = [
-            Column("deviator", components, None, "tensor"),
-            Column("plastic_strain", 0, "1"),
-            Column("temperature", 0, "K"),
-            Column("pressure", 0, "Pa"),
-            Column("sound_speed", 0, None),
-        ]
-        if self.constants["FAILS"] or self.constants["CONCRETE"]:
-            columns += [Column("damage", 0, "1"), Column("wear", 0, "1")]
-        if self.constants["FAILS"]:
-            columns.append(Column("toughness", 0, None))
-        if self.constants["CONCRETE"]:
-            columns.append(Column("compression", 0, "1"))
-        if self.constants["POLAR_ROTATION"]:
-            columns.append(Column("stretch", components, None, "tensor"))
-        return tuple(columns)
+        found = {column.name: column for material in self.materials for column in material.columns}
+        scatter = (SCATTER,) if any(material.scattered for material in self.materials) else ()
+        return (PRESSURE, *found.values(), *scatter)
+
+    def tables(self, material: Material) -> LawTables:
+        """The numbers of the laws; rows of bodies of other materials hold nothing."""
+        numbers = [np.full((len(self.bodies), len(fields(law))), np.nan) for law in material.laws.values()]
+        for b, body in enumerate(self.bodies):
+            if self.materials[self.number[b]] == material:
+                for name, table in zip(material.laws, numbers, strict=True):
+                    table[b] = numbers_of(getattr(body, name))
+        return LawTables(*numbers, *[np.empty((len(self.bodies), 0))] * (len(LawTables._fields) - len(numbers)))
 
     def initial(self, body: np.ndarray, id: np.ndarray, volume: np.ndarray) -> dict[str, np.ndarray]:
         """The columns of particles at rest: their bodies, global ids and volumes [m^D], all (n,)."""
-        n = len(body)
-        found = {c.name: np.zeros((n, c.width) if c.width else n) for c in self.columns}
-        found["temperature"] = self.tables[1][body, 7]
-        if "toughness" in found:
-            found["toughness"] = self._toughness(body, id, volume)
-        if "stretch" in found:
+        n, components = len(body), self.dimensions * (self.dimensions + 1) // 2
+        found = {"deviator": np.zeros((n, components)), "sound_speed": np.zeros(n)}
+        for column in self.columns:
+            found[column.name] = np.array([_initial(each, column) for each in self.bodies])[body]
+        if SCATTER in self.columns:
+            for b, each in enumerate(self.bodies):
+                if each.failure and each.failure.scatter:
+                    own = body == b
+                    found[SCATTER.name][own] = weibull(each.failure.scatter, id[own], volume[own], self.dimensions)
+        if self.constants["POLAR_ROTATION"]:
+            found["stretch"] = np.zeros((n, components))
             found["stretch"][:, : self.dimensions] = 1.0
         return found
 
-    def _toughness(self, body: np.ndarray, id: np.ndarray, volume: np.ndarray) -> np.ndarray:
-        """Failure strain or stress over that of the input: by the weakest link, a larger particle fails earlier."""
-        toughness = np.ones(len(body))
-        for number, each in enumerate(self.bodies):
-            if each.failure and each.failure.scatter:
-                own = body == number
-                toughness[own] = weibull(each.failure.scatter, id[own], volume[own], self.dimensions)
-        return toughness
 
-    def state(self, columns: Columns) -> list[Any]:
-        """The arrays that `deform` reads and writes, in its order; empty ones for what no material needs."""
-        names = ("energy", "density", "h", "deviator", "plastic_strain", "temperature", "pressure", "sound_speed")
-        rare = {"damage": 0, "wear": 0, "toughness": 0, "compression": 0, "stretch": (0, 0)}
-        found = columns.write(*names)
-        for name, shape in rare.items():
-            found += columns.write(name) if name in columns else [columns.device.empty(shape)]
-        return found
+def _initial(body: Body, column: Column) -> float:
+    """What the particles of a body remember at the start; 0 where no law of it has the column."""
+    if not isinstance(column.initial, str):
+        return column.initial
+    laws = [law for law in (body.eos, body.strength, body.failure) if law and column in law.columns]
+    return getattr(laws[0], column.initial) if laws else 0.0
 
 
-# ---- rows of constants -----------------------------------------------------------------------------------------------
+def numbers_of(law: Law) -> list[float]:
+    """The fields of a law as numbers: without limit where there is none; NaN for what is no number."""
+    values = [getattr(law, field.name) for field in fields(law)]
+    return [math.inf if v is None else float(v) if isinstance(v, int | float) else math.nan for v in values]
 
 
-def eos_constants(eos: SolidEos, density: float) -> tuple[float, ...]:
-    """rho0, c0, s1, s2, s3, gamma0, a, b1, b2 of solid/formulas/solid_eos.py; of concrete, those of its elastic
-    part."""
-    match eos:
-        case MieGrueneisen(c0, s1, s2, s3, gamma0, a):
-            return density, c0, s1, s2, s3, gamma0, a, 1.0 - 0.5 * gamma0, -0.5 * a
-        case LinearEos(bulk_modulus):
-            return density, math.sqrt(bulk_modulus / density), 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        case Compaction(crush_pressure, crush_strain):
-            return eos_constants(LinearEos(crush_pressure / crush_strain), density)
-
-
-def strength_constants(strength: Strength) -> tuple[float, ...]:
-    """Shear modulus, A, B, n, C, m, reference rate, room and melt temperature, heat capacity, Taylor-Quinney factor."""
-    match strength:
-        case NoStrength():
-            return _rate_independent(0.0, 0.0)
-        case Elastic(shear_modulus) | Concrete(shear_modulus):
-            return _rate_independent(shear_modulus, math.inf)
-        case PerfectlyPlastic(shear_modulus, yield_stress):
-            return _rate_independent(shear_modulus, yield_stress)
-        case LinearHardening(shear_modulus, yield_stress, hardening_modulus):
-            return _rate_independent(shear_modulus, yield_stress, hardening_modulus)
-        case JohnsonCook(G, A, B, n, C, m, reference_rate, room, melt, heat_capacity, taylor_quinney):
-            return G, A, B, n, C, m, reference_rate, room, melt, heat_capacity, taylor_quinney
-
-
-def _rate_independent(shear_modulus: float, yield_stress: float, hardening: float = 0.0) -> tuple[float, ...]:
-    return shear_modulus, yield_stress, hardening, 1.0, 0.0, 1.0, 1.0, ROOM_TEMPERATURE, math.inf, math.inf, 0.0
-
-
-def failure_constants(failure: Failure | None, size: float) -> tuple[float, ...]:
-    """D1 … D5, reference rate, tensile strength, fracture energy, width of a crack [m]: see
-    solid/formulas/damage.py."""
-    match failure:
-        case None:
-            return *NO_FAILURE, size
-        case JohnsonCookFailure(D1, D2, D3, D4, D5, reference_rate, spall_strength, fracture_energy):
-            spall = math.inf if spall_strength is None else spall_strength
-            return D1, D2, D3, D4, D5, reference_rate, spall, fracture_energy, size
-        case PrincipalStress(tensile_strength, fracture_energy):
-            return *NO_FAILURE[:6], tensile_strength, fracture_energy, size
+def rest_state(bodies: tuple[Body, ...], width: float) -> RestState:
+    """The bodies at rest; `width` of a crack in spacings."""
+    density = np.array([body.density for body in bodies])
+    sound = np.array([body.eos.reference_sound_speed(body.density) for body in bodies])
+    return RestState(
+        density,
+        density * sound * sound,
+        MINIMUM_MODULUS * density * sound * sound,
+        np.array([body.strength.shear_modulus for body in bodies]),
+        np.array([body.strength.flow_stress_at_rest() for body in bodies]),
+        np.array([width * body.spacing for body in bodies]),
+    )
 
 
 def crack_width(smoothing: float, dimensions: int) -> float:
@@ -185,40 +178,12 @@ def crack_width(smoothing: float, dimensions: int) -> float:
     return float(np.sum(weight * X[0] ** 2) / np.sum(weight * np.maximum(X[0], 0.0)))
 
 
-def concrete_constants(eos: Compaction, strength: Concrete, cracks: bool) -> tuple[float, ...]:
-    """The tuple `concrete` of solid/formulas/concrete.py; `cracks`: a failure model limits the tension."""
-    from scipy.optimize import brentq
-
-    dense = (0.0, 0.0, 0.0, eos.lock_strain, 0.0, eos.K1, eos.K2, eos.K3)
-    full = brentq(
-        lambda mu: dense_pressure(mu, dense) - eos.lock_pressure,
-        eos.lock_strain,
-        eos.lock_strain + 2.0 * eos.lock_pressure / eos.K1,
-        xtol=1e-15,
-    )
-    s = strength
-    return (
-        *(eos.crush_pressure, eos.crush_strain, eos.lock_pressure, eos.lock_strain, full, eos.K1, eos.K2, eos.K3),
-        *(s.compressive_strength, s.tensile_strength, s.A, s.B, s.N, s.C, s.cap),
-        *(s.D1, s.D2, s.least_failure_strain, s.reference_rate, math.inf if cracks else s.tensile_strength),
-    )
-
-
-def _eos_row(body: Body) -> tuple[float, ...]:
-    return eos_constants(body.eos, body.density)
-
-
-def _concrete_row(body: Body) -> tuple[float, ...]:
-    if not isinstance(body.strength, Concrete):
-        return NOT_CONCRETE
-    return concrete_constants(body.eos, body.strength, body.failure is not None)
-
-
 # ---- scatter ---------------------------------------------------------------------------------------------------------
 
 
 def weibull(scatter: Scatter, id: np.ndarray, volume: np.ndarray, dimensions: int) -> np.ndarray:
-    """(n,) factors of a Weibull distribution whose mean is 1 for a volume size^D, lower for larger volumes.
+    """(n,) factors of a Weibull distribution whose mean is 1 for a volume size^D, lower for larger volumes: by the
+    weakest link, a larger particle fails earlier.
 
     A particle's factor depends on the seed and its global id alone.
     """

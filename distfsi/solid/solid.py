@@ -26,9 +26,10 @@ from distfsi.scene.description import Scene
 from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
 from distfsi.solid import neighbours, pieces, total_lagrangian, updated
-from distfsi.solid.formulas.strength import von_mises
-from distfsi.solid.kernels import material, motion
+from distfsi.solid.formulas.stress import von_mises
+from distfsi.solid.kernels import motion
 from distfsi.solid.kernels.records import VELOCITY
+from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
 from distfsi.solid.protocol import SolidForm
@@ -44,7 +45,6 @@ DRIVERS = (
     motion.apply_impulse,
     motion.average_velocity,
     motion.move,
-    material.deform,
     *updated.DRIVERS,
     *total_lagrangian.DRIVERS,
 )
@@ -73,11 +73,11 @@ class Solid:
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = D = scene.domain.dimensions
         self.materials = Materials(scene.solid, D)
-        self._tables = [team.array(table) for table in self.materials.tables]
         self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
         self.body_force = BodyForce(scene.sources, D)
         constants = self._constants(scene)
         self.kernels = team.build(DRIVERS, constants)
+        self._points = MaterialGroups(self.materials, team, constants)
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, team, self.kernels)
         self.form = self._form(scene)
@@ -100,7 +100,7 @@ class Solid:
         c = self._own_particles(scene)
         self.columns = Columns(team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
-        self._deform(0.0, team.zeros((self.count, D**2)))
+        self._points.deform(self.columns, 0.0, team.zeros((self.count, D**2)))
         self.form.bind(self.columns, self.exchange)
 
     def _constants(self, scene: Scene) -> dict[str, object]:
@@ -120,7 +120,7 @@ class Solid:
     def _form(self, scene: Scene) -> SolidForm:
         search = NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
         if scene.solid.form == "total_lagrangian":
-            given = (self.communicator, scene.solid, *self._tables[:2], self.dimensions)
+            given = (self.communicator, scene.solid, self._points, self.dimensions)
             return TotalLagrangian(self.kernels, self.exchange, search, *given)
         repels = scene.solid.artificial_stress > 0.0
         return UpdatedLagrangian(self.kernels, self.team, search, self.dimensions, repels)
@@ -215,7 +215,7 @@ class Solid:
         (around,) = self._near.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
         self.form.strain(c, self._near, dt, around, gradient)
-        self._deform(dt, gradient)
+        self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
         c.adopt("position", moved)
@@ -244,6 +244,7 @@ class Solid:
         if home is self._home:
             return
         self._home, bodies = home, self.given.shape[1]
+        self._points.select(self.columns["body"])
         self._block = home.host() - self.blocks.first
         group = self._block * bodies + self.columns["body"]
         self._order = np.lexsort((self.columns["id"], group))
@@ -260,10 +261,6 @@ class Solid:
     def _sorted(self, *names: str) -> dict[str, np.ndarray]:
         """The columns of these names by (block, body, id), an order that depends on nothing else."""
         return {name: self.columns[name][self._order] for name in names}
-
-    def _deform(self, dt: float, gradient: Any) -> None:
-        c = self.columns
-        self._run(self.kernels.deform, dt, gradient, *c.read("body"), *self._tables, *self.materials.state(c))
 
     def _run(self, kernel: Any, *arguments: Any) -> None:
         self.team.run(kernel, self.count, *arguments)
@@ -357,7 +354,7 @@ class Solid:
         D, rows = self.dimensions, self._order if chosen is None else chosen
         c = {name: column[rows] for name, column in self.columns.items()}
         vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
-        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.unit)]
+        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.written)]
         names += [name for name in ("piece", *self._shown) if name in c]
         invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
         return vectors | {name: c[name] for name in names} | invariant

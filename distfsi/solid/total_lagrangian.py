@@ -30,6 +30,7 @@ from distfsi.solid.kernels.records import (
     StrainResult,
     Volumes,
 )
+from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.neighbours import Near, NeighbourSearch
 from distfsi.solid.updated import UpdatedLagrangian
 
@@ -42,7 +43,6 @@ DRIVERS = (
     cracks.spread_damage,
     cracks.find_cracks,
     cracks.cut_bonds,
-    cracks.open_voids,
     kernels.pack_payload,
     kernels.pack_bond_state,
     kernels.accelerate_bonds,
@@ -77,14 +77,11 @@ class TotalLagrangian:
         search: NeighbourSearch,
         communicator: Communicator,
         scene: Solid,
-        eos: Any,
-        strength: Any,
+        materials: MaterialGroups,
         dimensions: int,
     ):
-        """`eos`, `strength`: those tables of the materials, on the device."""
         self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
-        self._communicator, self._eos, self._strength = communicator, eos, strength
-        self._dimensions = dimensions
+        self._communicator, self._materials, self._dimensions = communicator, materials, dimensions
         spacing = np.array([body.spacing for body in scene.bodies])
         self._network = BondNetwork(kernels, exchange, search, communicator, spacing, scene.smoothing)
         self._debris = UpdatedLagrangian(kernels, self._device, search, dimensions)
@@ -155,16 +152,20 @@ class TotalLagrangian:
         vector = tuple((a,) for a in axes)
         parity = ((), *vector, *((a, b) for a in axes for b in axes))
         bond_state, payload = self._device.empty((n, 1 + D + D * D)), self._device.empty((n, CRACK + D))
-        body = c.read("body")
-        shape = (_fit(c), *c.read("position", "reference", "detaching", "neighbourhood_damage"))
-        self._run(n, "pack_bond_state", *body, self._strength, _material(c), *shape, bond_state)
         cohesion = Cohesion(*c.read(*Cohesion._fields))
-        known = (*c.read("volume"), *body, cohesion, *c.read("deformation"), self._damage(c))
+        shape = (Fit(*c.read("correction", "deformation")), *c.read("position", "reference"), cohesion)
+        self._run(n, "pack_bond_state", self._materials.rest, self._material(c), *shape, bond_state)
+        known = (*c.read("volume", "body"), cohesion, *c.read("deformation"), self._damage(c))
         self._run(n, "pack_payload", *known, payload)
         return [(*c.read("reference"), "position"), (bond_state, parity), (payload, (*((),) * CRACK, *vector))]
 
     def _damage(self, c: Columns) -> Any:
         return c.read("damage")[0] if "damage" in c else self._device.empty(0)
+
+    def _material(self, c: Columns) -> BondedMaterial:
+        strain = c.read("plastic_strain")[0] if "plastic_strain" in c else self._device.empty(0)
+        body, density, sound_speed = c.read("body", "density", "sound_speed")
+        return BondedMaterial(body, density, sound_speed, strain, *c.read("deviator", "pressure", "viscous_pressure"))
 
     # ---- a step -----------------------------------------------------------------------------------------------------
 
@@ -186,7 +187,7 @@ class TotalLagrangian:
         self._run(near.own, "accelerate_bonds", bonds, bond_state, volume, mass, acceleration)
         self._contact.find(c, near, reference, payload, self._network.continued)
         self._contact.accelerate(mass, acceleration)
-        given = (*c.read("body"), _material(c), *c.read("deformation"), acceleration, limits)
+        given = (self._material(c), *c.read("deformation"), acceleration, limits)
         self._run(near.own, "limit_bonds", bonds.count, self._network.bodies, *given)
         self._bonds, self._bond_state = bonds, bond_state
 
@@ -230,17 +231,7 @@ class TotalLagrangian:
         self._run(near.own, "strain_bonds", dt, self._bonds, self._bond_state, motion, point, fit, result)
         self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
         if breaking and dt > 0.0:
-            volumes = Volumes(*c.read("mass", "density", "volume"), *c.write("void"))
-            known = (*c.read("energy"), volumes, self._bonds.count, self._damage(c))
-            self._run(near.own, "open_voids", dt, *c.read("body"), self._eos, *known, gradient)
+            self._materials.open_voids(c, dt, self._bonds.count, gradient)
 
     def _run(self, count: int, kernel: str, *arguments: Any) -> None:
         self._device.run(getattr(self._kernels, kernel), count, *arguments)
-
-
-def _fit(c: Columns) -> Fit:
-    return Fit(*c.read("correction", "deformation"))
-
-
-def _material(c: Columns) -> BondedMaterial:
-    return BondedMaterial(*c.read(*BondedMaterial._fields))

@@ -20,15 +20,15 @@ def find_largest(begin, end, chunk, values, largest):
 
 
 @driver
-def find_minimum(begin, end, chunk, values, minimum, index):
-    """minimum[c] = first of the smallest values in chunk c, or of its NaN; index[c] = where it is."""
+def find_minimum(begin, end, chunk, values, lowest, index):
+    """lowest[c] = first of the smallest values in chunk c, or of its NaN; index[c] = where it is."""
     for c in range(begin, end):
         first = c * chunk
         smallest = values[first]
         for i in range(first + 1, min(first + chunk, len(values))):
             if values[i] < smallest or (values[i] != values[i] and smallest == smallest):
                 smallest, first = values[i], i
-        minimum[c] = smallest
+        lowest[c] = smallest
         index[c] = first
 
 

@@ -7,7 +7,7 @@ from math import exp, sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FAILS
+from distfsi.formulas.symbols import DIMENSIONS, FAILS, YIELDS
 from distfsi.formulas.tensors import (
     contraction,
     determinant,
@@ -62,6 +62,7 @@ from distfsi.solid.kernels.records import (
     Bonds,
     Cohesion,
     Fit,
+    RestState,
     StrainResult,
     Volumes,
 )
@@ -209,28 +210,27 @@ def pack_payload(begin, end, volume, body, cohesion: Cohesion, deformation, dama
 
 @driver
 def pack_bond_state(
-    begin, end, body, elasticity, material: BondedMaterial, fit: Fit, position, reference, detaching, damage, bond_state
+    begin, end, rest: RestState, material: BondedMaterial, fit: Fit, position, reference, cohesion: Cohesion, bond_state
 ):
     """bond_state[i] = stiffness, displacement and bond stress of particle i. Where bonds cross a crack, what is unseen
-    is its opening; the bonds of a particle that detaches no longer determine its strain.
-
-    `elasticity` (bodies, …): shear modulus and flow stress [Pa]; `damage`: that of the neighbourhood.
-    """
+    is its opening; the bonds of a particle that detaches no longer determine its strain."""
     for i in range(begin, end):
         # Stiffness against what the deformation gradient does not see.
-        softened = damage[i] if FAILS else 0.0
-        shear_modulus, flow_stress = elasticity[body[i], 0], elasticity[body[i], 1]
-        density, sound_speed, strain = material.density[i], material.sound_speed[i], material.plastic_strain[i]
-        kappa = zero_energy_stiffness(density, sound_speed, strain, softened, shear_modulus, flow_stress)
+        damage = cohesion.neighbourhood_damage[i] if FAILS else 0.0
+        strain = material.plastic_strain[i] if YIELDS else 0.0
+        body = material.body[i]
+        shear_modulus, flow_stress = rest.shear_modulus[body], rest.flow_stress[body]
+        density, sound_speed, detaching = material.density[i], material.sound_speed[i], cohesion.detaching[i] > 0
+        kappa = zero_energy_stiffness(density, sound_speed, strain, damage, shear_modulus, flow_stress)
         # Stress in the reference state, corrected.
         pressure = material.pressure[i] + material.viscous_pressure[i]
         deformation, correction = matrix_of(fit.deformation, i), matrix_of(fit.correction, i)
         stress = bond_stress(tensor_of(material.deviator, i), pressure, deformation, correction, kappa)
-        bond_state[i, STIFFNESS] = 0.0 if detaching[i] > 0 else kappa
+        bond_state[i, STIFFNESS] = 0.0 if detaching else kappa
         for a in static_range(DIMENSIONS):
             bond_state[i, DISPLACEMENT + a] = position[i, a] - reference[i, a]
             for b in static_range(DIMENSIONS):
-                bond_state[i, 1 + DIMENSIONS + a * DIMENSIONS + b] = 0.0 if detaching[i] > 0 else stress[a][b]
+                bond_state[i, 1 + DIMENSIONS + a * DIMENSIONS + b] = 0.0 if detaching else stress[a][b]
 
 
 # ---- a step ---------------------------------------------------------------------------------------------------------
@@ -291,13 +291,11 @@ def strain_bonds(begin, end, dt, bonds: Bonds, bond_state, motion, point: Bonded
 
 
 @driver
-def limit_bonds(
-    begin, end, bond_count, bodies: Bodies, body, material: BondedMaterial, deformation, acceleration, limits
-):
+def limit_bonds(begin, end, bond_count, bodies: Bodies, material: BondedMaterial, deformation, acceleration, limits):
     """limits[i] = the time steps that a bonded particle allows."""
     for i in range(begin, end):
         if bond_count[i] > 0:
-            shortest = bodies.smoothing[body[i]] * least_stretch(matrix_of(deformation, i))
+            shortest = bodies.smoothing[material.body[i]] * least_stretch(matrix_of(deformation, i))
             a = vector_of(acceleration, i)
             sound_speed, viscous_pressure = material.sound_speed[i], material.viscous_pressure[i]
             limits[i, 0] = signal_time(shortest, sound_speed, viscous_pressure, material.density[i])

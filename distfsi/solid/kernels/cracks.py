@@ -1,15 +1,14 @@
-"""Loops of the total Lagrangian form where the material fails: cracks, the bonds that they cut, debris, voids."""
+"""Loops of the total Lagrangian form where the material fails: cracks, the bonds that they cut, debris."""
 
-from math import log, sqrt
+from math import sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FAILS
-from distfsi.formulas.tensors import dot, times, trace
+from distfsi.formulas.symbols import DIMENSIONS
+from distfsi.formulas.tensors import dot, times
 from distfsi.solid.formulas.bonds import crack_seen, is_face, most_stretched
-from distfsi.solid.formulas.solid_eos import free_swelling
 from distfsi.solid.kernels.bonds import bond_weight
-from distfsi.solid.kernels.material import EOS_CONSTANTS
+from distfsi.solid.kernels.material import has_failed
 from distfsi.solid.kernels.matrices import difference, matrix_of, store_vector, vector_of
 from distfsi.solid.kernels.records import (
     CRACK,
@@ -21,7 +20,6 @@ from distfsi.solid.kernels.records import (
     STRETCH,
     Bodies,
     Bonds,
-    Volumes,
 )
 
 OPENED = 0.5  # spacings: an opening that neither end of a bond sees as its own stretch
@@ -30,14 +28,6 @@ SAME_FACE = 0.5  # cosine between the normals of particles at one face of a crac
 
 
 # ---- marks -----------------------------------------------------------------------------------------------------------
-
-
-@helper
-def has_failed(damage, i):
-    """Whether the material of a particle has failed."""
-    if FAILS:
-        return damage[i] >= 1.0
-    return False
 
 
 @driver
@@ -191,25 +181,3 @@ def cut_bonds(begin, end, position, reference, bodies: Bodies, body, payload, ke
             key[i, n] = -1
         lost[i] = bonds.count[i] - kept
         bonds.count[i] = kept
-
-
-# ---- voids -----------------------------------------------------------------------------------------------------------
-
-
-@driver
-def open_voids(begin, end, dt, body, eos, energy, volumes: Volumes, bond_count, damage, gradient):
-    """Failed particles swell until they have no pressure: what their surroundings give way beyond that is void, and
-    must close again first."""
-    for i in range(begin, end):
-        if has_failed(damage, i) or bond_count[i] == 0:
-            law = tuple(eos[body[i], k] for k in static_range(EOS_CONSTANTS))
-            divergence = trace(matrix_of(gradient, i))
-            # All growth of the volume so far and in this step, of which the material takes what it can.
-            swollen = log(volumes.mass[i] / (volumes.volume[i] * volumes.density[i]))
-            whole = swollen + volumes.void[i] + dt * divergence
-            solid = min(whole, free_swelling(energy[i], law))
-            volumes.void[i] = whole - solid
-            # The gradient becomes that of the material.
-            growth = ((solid - swollen) / dt - divergence) / DIMENSIONS
-            for d in static_range(DIMENSIONS):
-                gradient[i, d * DIMENSIONS + d] += growth

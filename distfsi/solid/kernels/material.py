@@ -1,37 +1,48 @@
-"""Loop of the material point: what a velocity gradient does to the stress, the temperature and the damage.
+"""Loops over the particles of one material: what a velocity gradient does to stress, temperature and damage.
 
-A form of the solid (updated or total Lagrangian) gives each particle's velocity gradient at mid-step; all else here
-belongs to the material. solid/materials.py declares the tables and columns.
+A form of the solid gives each particle's velocity gradient at mid-step; all else here belongs to the material. The laws
+are chosen by the scene (solid/materials.py): `eos_response`, `strength_response` and `failure_response` are formulas of
+laws in laws/solid/, whose numbers come from a table with a row for each body.
 """
+
+from math import log
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import COMPONENTS, CONCRETE, FAILS, POLAR_ROTATION
-from distfsi.formulas.tensors import trace
-from distfsi.solid.formulas.concrete import (
-    compacted_strain,
-    concrete_pressure,
-    concrete_strength,
-    concrete_wear,
-    unloading_modulus,
+from distfsi.formulas.symbols import (
+    COMPONENTS,
+    DIMENSIONS,
+    EOS_COLUMNS,
+    EOS_FIELDS,
+    FAILS,
+    FAILURE_COLUMNS,
+    FAILURE_FIELDS,
+    POLAR_ROTATION,
+    SCATTERED,
+    STRENGTH_COLUMNS,
+    STRENGTH_FIELDS,
+    carried_share,
+    elastic_density,
+    eos_response,
+    failure_response,
+    free_swelling,
+    homologous_temperature,
+    strength_response,
 )
-from distfsi.solid.formulas.damage import crack_share, ductile_wear, elastic_energy, largest_principal, tensile_damage
+from distfsi.formulas.tensors import trace
+from distfsi.laws.law import EosMemory, FailureMemory, StrengthMemory
 from distfsi.solid.formulas.rotation import polar_rotation, vorticity
 from distfsi.solid.formulas.smoothing import dilated
-from distfsi.solid.formulas.solid_eos import bulk_modulus, solid_pressure, solid_sound_speed
-from distfsi.solid.formulas.strength import (
-    homologous_temperature,
-    plastic_heating,
-    plastic_increment,
+from distfsi.solid.formulas.stress import (
+    crack_energy,
+    largest_principal,
+    longitudinal_speed,
     stretching,
     trial_deviator,
     von_mises,
-    yield_stress,
 )
-from distfsi.solid.kernels.matrices import matrix_of, tensor_of
-
-EOS_CONSTANTS, STRENGTH_CONSTANTS, FAILURE_CONSTANTS, CONCRETE_CONSTANTS = 9, 11, 9, 20  # columns of the tables
-COMPRESSIVE_STRENGTH = 8  # of concrete
+from distfsi.solid.kernels.matrices import matrix_of, store_tensor, tensor_of
+from distfsi.solid.kernels.records import LawTables, MaterialPoints, RestState, Volumes
 
 
 @helper
@@ -39,143 +50,118 @@ def spin_of(rates, stretch, i, dt):
     """Spin of the axes of stress; with polar rotation the stretch is advanced."""
     if POLAR_ROTATION:
         spin, after = polar_rotation(rates, tensor_of(stretch, i), dt)
-        for c in static_range(COMPONENTS):
-            stretch[i, c] = after[c]
+        store_tensor(stretch, i, after)
         return spin
     return vorticity(rates)
 
 
-@driver
-def deform(
-    begin, end, dt, gradient, body, eos, strength, failure, concrete, energy, density, h, deviator, plastic_strain,
-    temperature, pressure, sound_speed, damage, wear, toughness, compression, stretch,
-):  # fmt: skip
-    """Advance density, smoothing length and all that a material remembers by `dt` of the velocity gradient.
-
-    `eos`, `strength`, `failure` and `concrete` hold one row of constants per body. `deviator` and `pressure` are what
-    the particle carries: the stress of the intact material times 1 - damage, pressure only in tension.
-    """
-    for i in range(begin, end):
-        rates, own = matrix_of(gradient, i), body[i]
-        density[i], h[i] = dilated(density[i], h[i], trace(rates), dt)
-        law = tuple(eos[own, k] for k in static_range(EOS_CONSTANTS))
-        metal = tuple(strength[own, k] for k in static_range(STRENGTH_CONSTANTS))
-        spin = spin_of(rates, stretch, i, dt)
-        before = intact_deviator(deviator, pressure, damage, concrete, own, i)
-        stress = trial_deviator(before, rates, spin, metal[0], dt)
-        p, scale, is_concrete = 0.0, 1.0, False
-        if CONCRETE:
-            is_concrete = concrete[own, COMPRESSIVE_STRENGTH] > 0.0
-            if is_concrete:
-                rate = 2.0 / 3.0 * von_mises(stretching(rates))
-                p, scale = crush(
-                    i, own, rate, stress, law, metal[0], concrete, density, plastic_strain, sound_speed, damage, wear,
-                    compression,
-                )  # fmt: skip
-        if not is_concrete:
-            p, scale = flow(
-                i, own, dt, stress, law, metal, failure, energy, density, plastic_strain, temperature, sound_speed,
-                damage, wear, toughness,
-            )  # fmt: skip
-        carry(i, own, p, scale, stress, law, metal[0], failure, concrete, deviator, pressure, damage, toughness)
-
-
 @helper
-def intact_deviator(deviator, pressure, damage, concrete, own, i):
+def intact_deviator(point: MaterialPoints, law, damage, i):
     """Deviatoric stress of the intact material."""
     if FAILS:
-        share = carried_share(pressure[i], damage[i], concrete, own)
+        share = carried_share(law, point.pressure[i], damage)
         restored = 1.0 / share if share > 0.0 else 0.0
-        return tuple(restored * deviator[i, c] for c in static_range(COMPONENTS))
-    return tensor_of(deviator, i)
+        return tuple(restored * point.deviator[i, c] for c in static_range(COMPONENTS))
+    return tensor_of(point.deviator, i)
 
 
-@helper
-def carried_share(p, D, concrete, own):
-    """What share of the intact material's deviator is carried; closed cracks in concrete carry it by friction."""
-    if CONCRETE:
-        return 1.0 if p >= 0.0 and concrete[own, COMPRESSIVE_STRENGTH] > 0.0 else 1.0 - D
-    return 1.0 - D
-
-
-@helper
-def flow(
-    i,
-    own,
+@driver
+def deform(
+    begin,
+    end,
+    chosen,
     dt,
-    stress,
-    law,
-    metal,
-    failure,
-    energy,
-    density,
-    plastic_strain,
-    temperature,
-    sound_speed,
-    damage,
-    wear,
-    toughness,
+    gradient,
+    point: MaterialPoints,
+    rest: RestState,
+    laws: LawTables,
+    eos_memory: EosMemory,
+    strength_memory: StrengthMemory,
+    failure_memory: FailureMemory,
 ):
-    """Metal: radial return and equation of state; pressure [Pa] and the factor that returns the trial `stress`."""
-    trial = von_mises(stress)
-    increment, level = 0.0, trial
-    if trial > yield_stress(plastic_strain[i], 0.0, temperature[i], metal):
-        increment = plastic_increment(trial, plastic_strain[i], temperature[i], dt, metal)
-        level = trial - 3.0 * metal[0] * increment
-        plastic_strain[i] += increment
-        share = 1.0 - damage[i] if FAILS else 1.0
-        temperature[i] += plastic_heating(increment, share * level, density[i], metal)
-    p = solid_pressure(density[i], energy[i], law)
-    bulk = bulk_modulus(density[i], energy[i], p, law)
-    sound_speed[i] = solid_sound_speed(density[i], bulk, metal[0], law)
-    if FAILS:
-        fracture = tuple(failure[own, k] for k in static_range(FAILURE_CONSTANTS))
-        heat = homologous_temperature(temperature[i], metal)
-        if increment > 0.0 and wear[i] < 1.0:
-            wear[i] = min(wear[i] + ductile_wear(increment, p, level, dt, heat, toughness[i], fracture), 1.0)
-        if wear[i] >= 1.0:
-            tension = min(p, 0.0)
-            wear[i] = min(wear[i] + crack_share(increment * level, fracture), 2.0)
-            stored = crack_share(0.5 * tension * tension / bulk, fracture)
-            damage[i] = max(damage[i], min(wear[i] - 1.0 + stored, 1.0))
-    return (p, level / trial if increment > 0.0 else 1.0)
+    """Advance density, smoothing length and all that a material remembers by `dt` of the velocity gradient, for the
+    particles `chosen`."""
+    for r in range(begin, end):
+        i = chosen[r]
+        own = point.body[i]
+        eos = tuple(laws.eos[own, k] for k in static_range(EOS_FIELDS))
+        strength = tuple(laws.strength[own, k] for k in static_range(STRENGTH_FIELDS))
+        rates, shear_modulus = matrix_of(gradient, i), rest.shear_modulus[own]
+        damage = failure_memory[0][i] if FAILS else 0.0
+
+        # Volume.
+        density, h = dilated(point.density[i], point.h[i], trace(rates), dt)
+        point.density[i] = density
+        point.h[i] = h
+
+        # Pressure of the intact material.
+        at_rest = (rest.density[own], rest.bulk_modulus[own])
+        known = tuple(eos_memory[k][i] for k in static_range(EOS_COLUMNS))
+        held = tuple(strength_memory[k][i] for k in static_range(STRENGTH_COLUMNS))
+        state = eos_response(eos, elastic_density(strength, density, held), point.energy[i], at_rest, known)
+        for k in static_range(EOS_COLUMNS):
+            eos_memory[k][i] = state[3 + k]
+        point.sound_speed[i] = longitudinal_speed(density, state[1], shear_modulus, rest.minimum_modulus[own])
+
+        # Its deviatoric stress, as if it were elastic.
+        spin = spin_of(rates, point.stretch, i, dt)
+        stress = trial_deviator(intact_deviator(point, strength, damage, i), rates, spin, shear_modulus, dt)
+        elastic = von_mises(stress)
+
+        # Plastic flow brings it back to what the material bears.
+        rate = 2.0 / 3.0 * von_mises(stretching(rates))
+        compression = density / at_rest[0] - 1.0
+        trial = (elastic, state[0], density, compression, state[1], at_rest[1], rate, state[2], damage)
+        flowed = strength_response(strength, trial, dt, held)
+        for k in static_range(STRENGTH_COLUMNS):
+            strength_memory[k][i] = flowed[3 + k]
+        pressure, increment = flowed[1], flowed[2]
+        scale = flowed[0] / elastic if increment > 0.0 else 1.0
+
+        # Damage, and the stress that is carried.
+        carried, open_share = 1.0, 1.0
+        if FAILS:
+            law = tuple(laws.failure[own, k] for k in static_range(FAILURE_FIELDS))
+            principal = scale * largest_principal(stress) - pressure
+            energy = crack_energy(scale * elastic, pressure, shear_modulus, rest.bulk_modulus[own])
+            kept = tuple(flowed[3 + k] for k in static_range(STRENGTH_COLUMNS))
+            heat = homologous_temperature(strength, kept)
+            factor = point.strength_scatter[i] if SCATTERED else 1.0
+            load = (increment, flowed[0], pressure, principal, energy, state[1], heat, factor)
+            worn = tuple(failure_memory[k][i] for k in static_range(FAILURE_COLUMNS))
+            damaged = failure_response(law, load, dt, rest.crack_width[own], worn)
+            for k in static_range(FAILURE_COLUMNS):
+                failure_memory[k][i] = damaged[k]
+            open_share = 1.0 - damaged[0]
+            carried = carried_share(strength, pressure, damaged[0])
+        for c in static_range(COMPONENTS):
+            point.deviator[i, c] = carried * scale * stress[c]
+        point.pressure[i] = pressure if pressure > 0.0 else open_share * pressure
 
 
 @helper
-def crush(
-    i, own, rate, stress, law, shear_modulus, concrete, density, plastic_strain, sound_speed, damage, wear, compression
-):
-    """Concrete: compaction, pressure-dependent yield, wear; pressure and factor as `flow`. `rate` [1/s] of strain."""
-    stone = tuple(concrete[own, k] for k in static_range(CONCRETE_CONSTANTS))
-    mu = density[i] / law[0] - 1.0
-    before = compacted_strain(compression[i], stone)
-    compression[i] = max(compression[i], mu)
-    p = concrete_pressure(mu, compression[i], wear[i], stone)
-    bulk = (1.0 + mu) * unloading_modulus(compression[i], stone)
-    sound_speed[i] = solid_sound_speed(density[i], bulk, shear_modulus, law)
-
-    trial = von_mises(stress)
-    cracked = damage[i] if p > 0.0 else 0.0  # in tension the carried share counts the crack already
-    level = concrete_strength(p, rate, max(wear[i], cracked), stone)
-    increment = max(trial - level, 0.0) / (3.0 * shear_modulus)
-    plastic_strain[i] += increment
-    closed = compacted_strain(compression[i], stone) - before
-    wear[i] = min(wear[i] + concrete_wear(increment, closed, p, stone), 1.0)
-    return (p, level / trial if increment > 0.0 else 1.0)
-
-
-@helper
-def carry(i, own, p, scale, stress, law, shear_modulus, failure, concrete, deviator, pressure, damage, toughness):
-    """Store the stress that is carried, after cracks have grown under the largest principal stress."""
-    share, open_share = 1.0, 1.0
+def has_failed(damage, i):
+    """Whether the material of a particle has failed."""
     if FAILS:
-        fracture = tuple(failure[own, k] for k in static_range(FAILURE_CONSTANTS))
-        principal = scale * largest_principal(stress) - p
-        mises, tension = scale * von_mises(stress), max(-p, 0.0)
-        work = elastic_energy(mises, tension, shear_modulus, law[0] * law[1] * law[1])
-        damage[i] = max(damage[i], tensile_damage(principal, work, toughness[i], fracture))
-        open_share = 1.0 - damage[i]
-        share = carried_share(p, damage[i], concrete, own)
-    for c in static_range(COMPONENTS):
-        deviator[i, c] = share * scale * stress[c]
-    pressure[i] = p if p > 0.0 else open_share * p
+        return damage[i] >= 1.0
+    return False
+
+
+@driver
+def open_voids(begin, end, chosen, dt, body, eos, energy, volumes: Volumes, bond_count, damage, gradient):
+    """Failed particles and debris among the `chosen` swell until they have no pressure: what their surroundings give
+    way beyond that is void, and must close again first. `eos` (bodies, …): the numbers of their laws."""
+    for r in range(begin, end):
+        i = chosen[r]
+        if has_failed(damage, i) or bond_count[i] == 0:
+            law = tuple(eos[body[i], k] for k in static_range(EOS_FIELDS))
+            divergence = trace(matrix_of(gradient, i))
+            # All growth of the volume so far and in this step, of which the material takes what it can.
+            swollen = log(volumes.mass[i] / (volumes.volume[i] * volumes.density[i]))
+            whole = swollen + volumes.void[i] + dt * divergence
+            solid = min(whole, free_swelling(law, energy[i]))
+            volumes.void[i] = whole - solid
+            # The gradient becomes that of the material.
+            growth = ((solid - swollen) / dt - divergence) / DIMENSIONS
+            for d in static_range(DIMENSIONS):
+                gradient[i, d * DIMENSIONS + d] += growth

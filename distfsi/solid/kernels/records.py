@@ -95,6 +95,7 @@ class Volumes(NamedTuple):
 class BondedMaterial(NamedTuple):
     """What the forces of bonds need of the material of the own particles."""
 
+    body: Any
     density: Any
     sound_speed: Any
     plastic_strain: Any
@@ -121,6 +122,52 @@ class StrainResult(NamedTuple):
     viscous_pressure: Any
     gradient: Any
     detaching: Any
+
+
+class MaterialPoints(NamedTuple):
+    """The own particles, as their material sees them (n,): what all materials remember.
+
+    deviator, pressure  [Pa] that are carried, damage included
+    stretch             left stretch tensor of the polar decomposition, where axes of stress turn with its rotation
+    strength_scatter    factor of the strength of each particle, where it scatters
+    """
+
+    body: Any
+    energy: Any
+    density: Any
+    h: Any
+    deviator: Any
+    pressure: Any
+    sound_speed: Any
+    stretch: Any
+    strength_scatter: Any
+
+
+class RestState(NamedTuple):
+    """Of each body (bodies,), at rest.
+
+    density           [kg/m3]
+    bulk_modulus      [Pa]
+    minimum_modulus   [Pa] of the bulk, which expanded hot material keeps
+    shear_modulus     [Pa]
+    flow_stress       [Pa] von Mises stress at which plastic flow begins
+    crack_width       [m] in which particles beside a crack take its energy
+    """
+
+    density: Any
+    bulk_modulus: Any
+    minimum_modulus: Any
+    shear_modulus: Any
+    flow_stress: Any
+    crack_width: Any
+
+
+class LawTables(NamedTuple):
+    """The numbers of the laws of each body (bodies, ...)."""
+
+    eos: Any
+    strength: Any
+    failure: Any
 
 
 class Contacts(NamedTuple):

@@ -1,8 +1,11 @@
 """Pressure in proportion to the compression."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-from distfsi.laws.law import SolidEos, quantity
+from dataclasses import dataclass
+from math import sqrt
+
+from distfsi.laws.law import EosMemory, Rest, SolidEos, quantity
 
 
 @dataclass(frozen=True)
@@ -11,6 +14,9 @@ class LinearEos(SolidEos):
 
     bulk_modulus: float = quantity("Pa", "bulk modulus K", above=0.0)
 
-    def rest_bulk_modulus(self, density: float) -> float:
-        """Bulk modulus [Pa] at rest."""
-        return self.bulk_modulus
+    def reference_sound_speed(self, density):
+        return sqrt(self.bulk_modulus / density)
+
+    def respond(self, density, energy, rest: Rest, memory: EosMemory):
+        mu = density / rest.density - 1.0
+        return (rest.bulk_modulus * mu, (mu + 1.0) * rest.bulk_modulus, 0.0)

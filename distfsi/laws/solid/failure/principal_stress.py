@@ -1,8 +1,11 @@
 """Brittle failure by the largest principal stress."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
-from distfsi.laws.law import Failure, entry, quantity
+from distfsi.laws.law import DAMAGE, Failure, FailureMemory, Load, entry, quantity
+from distfsi.laws.solid.cracks import tensile_damage
 from distfsi.laws.solid.scatter import Scatter
 
 
@@ -15,3 +18,10 @@ class PrincipalStress(Failure):
         "J/m2", "energy that a crack takes per area, at any spacing; 0: failure at once", at_least=0.0, default=0.0
     )
     scatter: Scatter | None = entry("Weibull's scatter; default none", default=None)
+
+    columns = (DAMAGE,)
+
+    def respond(self, load: Load, dt, width, memory: FailureMemory):
+        strength = load.factor * self.tensile_strength
+        opened = tensile_damage(load.principal, load.energy, strength, self.fracture_energy, width)
+        return (max(memory.damage, opened),)

@@ -1,12 +1,16 @@
-"""The yield stress of metals by Johnson and Cook (paper, A.6)."""
+"""The yield stress of metals by Johnson and Cook (paper, A.6 and A.7)."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log, pow
 
-from distfsi.laws.law import Strength, number, quantity
+from distfsi.laws.law import StrengthMemory, number, quantity
+from distfsi.laws.solid.metal import HeatedMetal
 
 
 @dataclass(frozen=True)
-class JohnsonCook(Strength):
+class JohnsonCook(HeatedMetal):
     """Yield stress (A + B eps^n)(1 + C ln(rate/reference_rate))(1 - T*^m)."""
 
     shear_modulus: float = quantity("Pa", "shear modulus G", above=0.0)
@@ -25,3 +29,38 @@ class JohnsonCook(Strength):
         """The material is solid at the start."""
         if self.melt_temperature <= self.room_temperature:
             raise ValueError("melt_temperature must be above room_temperature")
+
+    def flow_stress_at_rest(self):
+        return self.A
+
+    def initial_yield(self, strain, temperature):
+        return self.yield_stress(strain, 0.0, temperature)
+
+    def flow(self, strain, increment, dt, temperature):
+        total = strain + increment
+        hardening = self.B * pow(total, self.n)
+        rate_slope = (self.A + hardening) * self.C if increment > self.reference_rate * dt else 0.0
+        strain_slope = self.n * hardening * increment / total * self.rate_factor(increment / dt)
+        slope = self.softening(temperature) * (strain_slope + rate_slope)
+        return (self.yield_stress(total, increment / dt, temperature), slope)
+
+    def yield_stress(self, strain, rate, temperature):
+        """Yield stress [Pa] of flow at a `rate` [1/s]."""
+        return (self.A + self.B * pow(strain, self.n)) * self.rate_factor(rate) * self.softening(temperature)
+
+    def rate_factor(self, rate):
+        """1 + C ln(rate/reference), 1 below the reference rate; `rate` [1/s]."""
+        return 1.0 + self.C * log(max(rate / self.reference_rate, 1.0))
+
+    def softening(self, temperature):
+        """1 - T*^m."""
+        return 1.0 - pow(self.scaled_temperature(temperature), self.m)
+
+    def scaled_temperature(self, temperature):
+        """T*, 0 at room temperature and 1 when molten, held in between; `temperature` [K]."""
+        return min(
+            max((temperature - self.room_temperature) / (self.melt_temperature - self.room_temperature), 0.0), 1.0
+        )
+
+    def homologous_temperature(self, memory: StrengthMemory):
+        return self.scaled_temperature(memory.temperature)

@@ -9,4 +9,5 @@ from distfsi.laws.law import Strength
 class NoStrength(Strength):
     """No deviatoric stress."""
 
-    shear_modulus = 0.0
+    def flow_stress_at_rest(self):
+        return 0.0
