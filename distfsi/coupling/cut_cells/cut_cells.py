@@ -161,11 +161,11 @@ class CutCells:
         merging, above = self._merging.merging_of(lists.band)
         # faces
         band, faces = self._fluxes.find_faces(lists.band, above, walls)
-        exchange, walled = self._forces.begin(band, motion)
+        loads, walled = self._forces.begin(band, motion)
         ends = self._merging.rows_in_band(self._sides.cells)
         start_volume = self.team.empty(lists.band.shape[0])
         self.geometry = CutGeometry(
-            motion, rows, walls, lists, band, merging, faces, ends, walled, exchange, start_volume, expands
+            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
         )
         return self.geometry
 

@@ -44,4 +44,4 @@ class BandFluxes:
         device.run(k.find_fluxes, boxes, band.cells, *known)
         boxes = -(-band.cells.shape[0] // lanes)
         states = (cells.before, geometry.start_volume, cells.input, cells.output)
-        device.run(k.advance_band, boxes, band, faces.flux, *states, geometry.exchange, times, self._grid)
+        device.run(k.advance_band, boxes, band, faces.flux, *states, geometry.loads, times, self._grid)

@@ -1,4 +1,4 @@
-"""What fluid and solid exchange at the wall: impulse, work, and the mass of fluid that goes along."""
+"""The loads of the fluid on the wall: impulse, work, and the mass of fluid that goes along."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from distfsi.coupling.cut_cells.geometry import WallGeometry
 from distfsi.coupling.cut_cells.kernels import forces as kernels
 from distfsi.coupling.cut_cells.kernels.band import BAND
-from distfsi.coupling.cut_cells.kernels.records import Band, Exchange, States
+from distfsi.coupling.cut_cells.kernels.records import Band, States, WallLoads
 from distfsi.coupling.cut_cells.merging import CellMerging
 from distfsi.coupling.cut_cells.values import CutGeometry, WallMotion
 from distfsi.coupling.kernels import spreading
@@ -51,44 +51,35 @@ class WallForces:
         self._particles, self._wall, self._merging, self._rows = particles, wall, merging, rows
         self._kernels, self._fluid_kernels = particle_kernels, fluid_kernels
         grid, array = blocks.grid, wall.device.array
-        self._D, self._cell_volume, self._table = (
-            grid.dimensions,
-            float(np.prod(grid.spacing)),
-            blocks.table_on(wall.device),
-        )
+        self._D, self._cell_volume = grid.dimensions, float(np.prod(grid.spacing))
+        self._table = blocks.table_on(wall.device)
         self._transfer = array(blocks.allocate(1 + self._D))
         self._parity = array(np.append(1 << np.arange(self._D), 0))
         images = np.array(grid.ghosts)
         self._seen_cells = array(np.column_stack([-images, grid.cells + images]))
 
-    def begin(self, band: Band, motion: WallMotion) -> tuple[Exchange, Any]:
-        """What fluid and wall exchange in a step, nothing at first, and with which velocity the wall moves in the cells
-        of the band; which of these it passes through, as places in the band."""
+    def begin(self, band: Band, motion: WallMotion) -> tuple[WallLoads, Any]:
+        """The loads on the wall in a step, none at first, and with which velocity the wall moves in the cells of the
+        band; which of these it passes through, as places in the band."""
         device, n, D = self._device, band.cells.shape[0], self._D
         sums = (device.zeros((n, D)), device.zeros(n), device.zeros((n, D)), device.zeros(n), device.zeros(n))
-        exchange, mark = Exchange(*sums), device.empty(n, np.int8)
+        loads, mark = WallLoads(*sums), device.empty(n, np.int8)
         device.run(self._kernels.mark_walled, n, band.area, mark)
         walled = self._rows.marked(mark)[1]
         walled = self._wall.near_order(walled, self._rows.taken(band.cells, walled), self._wall.blocks.shape)
-        self._interpolate(band.cells, walled, motion, motion.velocity, exchange.velocity, exchange.inertia)
-        return exchange, walled
+        self._interpolate(band.cells, walled, motion, motion.velocity, loads.velocity, loads.inertia)
+        return loads, walled
 
     def impulse_on(self, geometry: CutGeometry) -> tuple[Any, Any]:
         """Collective, after the stages. Impulse (own, D) [N s] on this rank's particles; and the velocity (own, D)
         [m/s] per added mass of fluid that goes along with light ones."""
-        device, own, p, band, motion = (
-            self._device,
-            self._particles.count,
-            self._particles,
-            geometry.band,
-            geometry.motion,
-        )
-        known = (band.cells, geometry.exchange, self._transfer, self._grid)
+        device, p, band, motion = self._device, self._particles, geometry.band, geometry.motion
+        known = (band.cells, geometry.loads, self._transfer, self._grid)
         device.run(self._fluid_kernels.find_transfer, band.cells.shape[0], *known)
         self._merging.ghosts.exchange((self._transfer, self._parity))
-        impulse, shared = (device.empty((own, self._D)) for _ in ("impulse", "shared"))
+        impulse, shared = (device.empty((p.count, self._D)) for _ in ("impulse", "shared"))
         moving = (motion.own_mass, p.fixed, p.before, p.velocity, self._spread(motion))
-        device.run(self._kernels.push_together, own, *moving, impulse, shared)
+        device.run(self._kernels.push_together, p.count, *moving, impulse, shared)
         return impulse, shared
 
     def correct(self, geometry: CutGeometry, excess: Any, shared: Any, states: States) -> tuple[np.ndarray, np.ndarray]:
@@ -96,20 +87,20 @@ class WallForces:
         impulses worked over that of the wall, `excess` (own, D) [m/s]; `shared` as of impulse_on(). Returns what it has
         given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
         device, own, D, k = self._device, self._particles.count, self._D, self._kernels
-        band, exchange, n = geometry.band, geometry.exchange, geometry.band.cells.shape[0]
+        band, loads, n = geometry.band, geometry.loads, geometry.band.cells.shape[0]
         # what cells see of the gains
         vector, gains = tuple((a,) for a in range(D)), device.empty((own, 2 * D + 1))
         device.run(k.find_gains, own, self._particles.carried, excess, shared, gains)
         (gains,) = geometry.motion.passage.plan.exchange([(gains, (*vector, *vector, ()))])
         seen, paid = device.zeros((n, 2 * D + 1)), device.empty(n)
-        self._interpolate(band.cells, geometry.walled, geometry.motion, gains, seen, exchange.inertia)
+        self._interpolate(band.cells, geometry.walled, geometry.motion, gains, seen, loads.inertia)
         # merge targets pay
         correction = self._transfer.reshape(-1)
-        device.run(k.find_corrections, n, band.cells, exchange, seen, correction, self._grid)
+        device.run(k.find_corrections, n, band.cells, loads, seen, correction, self._grid)
         self._merging.ghosts.exchange((self._transfer, self._parity))
         known = (geometry.merging, correction, paid, states, self._grid)
         device.run(self._fluid_kernels.correct_energy, n, band.cells, *known)
-        given = (exchange.impulse, exchange.work, paid)
+        given = (loads.impulse, loads.work, paid)
         impulse, work, extra = (self._cell_volume * geometry.lists.blocks.sums(amounts) for amounts in given)
         return impulse, work[:, 0] + extra[:, 0]
 
@@ -117,7 +108,7 @@ class WallForces:
         """Mean pressure times the time [Pa s] on the wall in each cell of the band, (n,) on the device."""
         n = geometry.band.cells.shape[0]
         pressure = self._device.empty(n)
-        self._device.run(self._kernels.find_pressures, n, geometry.band.area, geometry.exchange.impulse, pressure)
+        self._device.run(self._kernels.find_pressures, n, geometry.band.area, geometry.loads.impulse, pressure)
         return pressure
 
     def _interpolate(self, band: Any, walled: Any, motion: WallMotion, values: Any, mean: Any, inertia: Any) -> None:
@@ -133,13 +124,8 @@ class WallForces:
     def _spread(self, motion: WallMotion) -> Any:
         """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
         its own."""
-        own, wall, device, k, middle = (
-            self._particles.count,
-            self._wall,
-            self._device,
-            self._kernels,
-            motion.passage.own_middle,
-        )
+        own, wall, device, k = self._particles.count, self._wall, self._device, self._kernels
+        middle = motion.passage.own_middle
         gained, home = device.empty((own, 1 + self._D)), device.empty(own, np.int64)
         chosen = wall.coarse_order(middle, self._particles.id_on_device)
         device.run(k.find_homes, own, self._particles.start, home, self._grid, self._table)

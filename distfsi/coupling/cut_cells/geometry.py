@@ -171,12 +171,8 @@ class WallGeometry:
         """The new fractions and apertures become the old ones, and those of the wall that these points make the new
         ones; their spheres (n, 2 + D) and keys (n,)."""
         self.fractions, self.apertures = self.fractions[::-1], self.apertures[::-1]
-        run, k, distance, count = (
-            self.device.run,
-            self.kernels,
-            self._distance.device.reshape(-1),
-            points.position.shape[0],
-        )
+        run, k, count = self.device.run, self.kernels, points.position.shape[0]
+        distance = self._distance.device.reshape(-1)
         mark = self.device.empty(count, np.int8)
         run(k.mark_inflated, count, sphere, points.values, mark)
         inflated, rows = self._rows.marked(mark)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.coupling.cut_cells.kernels.records import Band, Contents, Exchange, Merging, States, Walls
+from distfsi.coupling.cut_cells.kernels.records import Band, Contents, Merging, States, WallLoads, Walls
 from distfsi.mesh.kernels.search import Bins
 from distfsi.mesh.particles import GhostPlan
 from distfsi.mesh.rows import Groups
@@ -102,7 +102,7 @@ class CutGeometry:
     faces     of the band that are open
     sides     (s,) rows of the cells at the domain's ends that are in the band or covered
     walled    (k,) places in the band of the cells that the wall passes through
-    exchange  what fluid and wall give to each other: the stages add to it
+    loads     how the wall moves, and what the fluid gives to it: the stages add to that
     start_volume  (n,) fluid volume fractions of the band's cells before the first stage, which leaves them here
     expands   whether whole cells fill what is missing in them: where lone particles have left a wall
     """
@@ -116,7 +116,7 @@ class CutGeometry:
     faces: OpenFaces
     sides: Any
     walled: Any
-    exchange: Exchange
+    loads: WallLoads
     start_volume: Any
     expands: bool
 

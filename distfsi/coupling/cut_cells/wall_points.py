@@ -24,13 +24,8 @@ class WallPoints:
 
     def __init__(self, particles: SolidParticles, rows: Rows, kernels: SimpleNamespace, cell: float):
         """`cell` [m]: the size of cells."""
-        self._particles, self._rows, self._device, self._kernels, self._cell = (
-            particles,
-            rows,
-            rows.device,
-            kernels,
-            cell,
-        )
+        self._particles, self._rows, self._device = particles, rows, rows.device
+        self._kernels, self._cell = kernels, cell
 
     def stretched(self) -> Any:
         """The rows (n,) of this rank's particles that are more than one point."""

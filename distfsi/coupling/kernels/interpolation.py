@@ -100,6 +100,7 @@ def sum_around(sums, x, radius, particles: Cloud):
     search grid."""
     for v in range(len(sums)):
         sums[v] = 0.0
+    # search cell by search cell, in the order of the particles' keys
     bx, by, bz = bins_around(x, tuple(radius for _ in static_range(DIMENSIONS)), particles.bins)
     for k in range(bz[0], bz[1]):
         for j in range(by[0], by[1]):

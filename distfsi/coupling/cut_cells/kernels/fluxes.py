@@ -8,8 +8,8 @@ from typing import NamedTuple
 from distfsi.coupling.cut_cells.kernels.records import (
     Band,
     Contents,
-    Exchange,
     States,
+    WallLoads,
     Walls,
     aperture_at,
     put_content,
@@ -195,22 +195,22 @@ def add_fluxes(D, n, band: Band, flux, dt, grid: BlockGrid):
 
 
 @helper
-def push_wall(D, n, now, freed, area, exchange: Exchange, stage: StageTimes):
+def push_wall(D, n, now, freed, area, loads: WallLoads, stage: StageTimes):
     """The wall in the cell number n of the band, of a state `now`, adds to dt times the divergence D, and to what it
     gets."""
-    wall = tuple(exchange.velocity[n, d] for d in static_range(DIMENSIONS))
+    wall = tuple(loads.velocity[n, d] for d in static_range(DIMENSIONS))
     size, normal = normal_of(area)
     if size > 0.0:
         W = primitives(now)
         relative = tuple(W[PHASES + d] - wall[d] for d in static_range(DIMENSIONS))
         approach = dot(relative, normal)
         p = wall_pressure(now, W, approach)
-        exchange.added[n] += stage.weight * wall_impedance(now, W, approach) * size
+        loads.added[n] += stage.weight * wall_impedance(now, W, approach) * size
         for d in static_range(DIMENSIONS):
             D[PHASES + d] += stage.dt * p * area[d]
-            exchange.impulse[n, d] += stage.weight * p * area[d]
+            loads.impulse[n, d] += stage.weight * p * area[d]
         D[PHASES + DIMENSIONS] += freed * p
-        exchange.work[n] += stage.weight * p * dot(area, wall)
+        loads.work[n] += stage.weight * p * dot(area, wall)
 
 
 @row
@@ -218,6 +218,7 @@ def content_row(S, Q, b, dt, n):
     """Q = contents after a stage of the n cells whose states before the step and now, volumes then and now, part that
     the wall has freed, and divergence stand in S; values of a cell are LANES apart."""
     for i in range(n):
+        # states before the step and now, volumes then and now, divergence, freed part
         content = stage_content(
             tuple(load(S, v * LANES + i) for v in static_range(VARIABLES)),
             tuple(load(S, (VARIABLES + v) * LANES + i) for v in static_range(VARIABLES)),
@@ -258,7 +259,7 @@ def advance_band(
     start_volume,
     now: States,
     after: Contents,
-    exchange: Exchange,
+    loads: WallLoads,
     stage: StageTimes,
     grid: BlockGrid,
 ):
@@ -266,7 +267,7 @@ def advance_band(
     LANES cells.
 
     before (blocks, VARIABLES, Z, Y, X), start_volume (n,): states and volumes of fluid before the step; `now` and
-    `after` share their volumes. What fluid and wall exchange grows.
+    `after` share their volumes. The loads on the wall grow.
     """
     cells = block_size(grid)
     D, S, Q = workspace(FLUXES), workspace((2 * VARIABLES + 3 + FLUXES) * LANES), workspace((VARIABLES + 2) * LANES)
@@ -279,10 +280,10 @@ def advance_band(
             add_fluxes(D, n, band, flux, stage.dt, grid)
             # the wall's part in it, and the volume that the wall frees
             area = tuple(band.area[n, d] for d in static_range(DIMENSIONS))
-            wall = tuple(exchange.velocity[n, d] for d in static_range(DIMENSIONS))
+            wall = tuple(loads.velocity[n, d] for d in static_range(DIMENSIONS))
             freed = real(stage.dt * dot(area, wall))  # the same to the bit in volume and content
             state = state_at(now.U, at, cells)
-            push_wall(D, n, state, freed, area, exchange, stage)
+            push_wall(D, n, state, freed, area, loads, stage)
             # volume by the geometric conservation law
             start, volume = start_volume[n], load(now.volume, volume_at(at, cells))
             put_lane(S, i, state_at(before, at, cells), state, start, volume, freed, D)

@@ -1,4 +1,4 @@
-"""Loops of what fluid and wall exchange: the velocity of the wall, the impulse on particles, and the work that the
+"""Loops of the loads on the wall: the velocity of the wall, the impulse on particles, and the work that the
 solid's gain of velocity costs.
 
 Cells give to particles with the weights by which they see them, mass times kernel; so momentum and work arrive as they
@@ -7,7 +7,7 @@ leave. Where the wall is lighter than the fluid that goes along with it, both sh
 
 from math import sqrt
 
-from distfsi.coupling.cut_cells.kernels.records import Exchange, Merging, States, step_to_target, volume_at
+from distfsi.coupling.cut_cells.kernels.records import Merging, States, WallLoads, step_to_target, volume_at
 from distfsi.coupling.kernels.interpolation import Cloud, are_near, put_point, sum_around_points
 from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.formulas.subset import static_range
@@ -65,8 +65,10 @@ def interpolate(begin, end, band, walled, width, mean, inertia, radius, particle
     for box in range(begin, end):
         first, last = box * LANES, min((box + 1) * LANES, len(walled))
         while first < last:
+            # cells that are near each other
             count = cells_near(points, band, walled, first, last, radius, grid)
             sum_around_points(sums, weight, around, points, radius, 1 + width, particles)
+            # means over the particles around them
             for i in range(count):
                 n = walled[first + i]
                 inertia[n] = sums[i]
@@ -79,16 +81,16 @@ def interpolate(begin, end, band, walled, width, mean, inertia, radius, particle
 
 
 @driver
-def find_transfer(begin, end, band, exchange: Exchange, transfer, grid: BlockGrid):
+def find_transfer(begin, end, band, loads: WallLoads, transfer, grid: BlockGrid):
     """transfer (blocks, D + 1, Z, Y, X) = velocity that a particle gains from a cell, and added mass over its own, per
     kernel value [m^(d+1)/s, m^d]."""
     cells = block_size(grid)
     for n in range(begin, end):
         at = first_value(band[n], DIMENSIONS + 1, cells)
-        per_mass = cell_volume(grid) / exchange.inertia[n] if exchange.inertia[n] > 0.0 else 0.0
+        per_mass = cell_volume(grid) / loads.inertia[n] if loads.inertia[n] > 0.0 else 0.0
         for d in static_range(DIMENSIONS):
-            store(transfer, at + d * cells, exchange.impulse[n, d] * per_mass)
-        store(transfer, at + DIMENSIONS * cells, exchange.added[n] * per_mass)
+            store(transfer, at + d * cells, loads.impulse[n, d] * per_mass)
+        store(transfer, at + DIMENSIONS * cells, loads.added[n] * per_mass)
 
 
 @driver
@@ -129,7 +131,7 @@ def find_gains(begin, end, carried, excess, shared, gains):
 
 
 @driver
-def find_corrections(begin, end, band, exchange: Exchange, gains, correction, grid: BlockGrid):
+def find_corrections(begin, end, band, loads: WallLoads, gains, correction, grid: BlockGrid):
     """correction (blocks, D + 1, Z, Y, X) [N s/m3, J/m3] = what a cell gives to the particles beyond its impulse and
     the work of that at the velocity of the wall; the impulse grows by it.
 
@@ -139,11 +141,12 @@ def find_corrections(begin, end, band, exchange: Exchange, gains, correction, gr
     cells = block_size(grid)
     for n in range(begin, end):
         at = first_value(band[n], DIMENSIONS + 1, cells)
-        owed = -exchange.added[n] * gains[n, 2 * DIMENSIONS]
+        # work and momentum of the added mass, and what the impulse worked beyond the wall's velocity
+        owed = -loads.added[n] * gains[n, 2 * DIMENSIONS]
         for d in static_range(DIMENSIONS):
-            given = -exchange.added[n] * gains[n, DIMENSIONS + d]
-            owed += exchange.impulse[n, d] * gains[n, d]
-            exchange.impulse[n, d] += given
+            given = -loads.added[n] * gains[n, DIMENSIONS + d]
+            owed += loads.impulse[n, d] * gains[n, d]
+            loads.impulse[n, d] += given
             store(correction, at + d * cells, given)
         store(correction, at + DIMENSIONS * cells, owed)
 

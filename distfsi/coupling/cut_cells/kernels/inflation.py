@@ -199,6 +199,7 @@ def sphere_row(nearest, box, points, particles: Cloud, start, stop, wide, reach,
                     load(points, d * LANES + i) - load(particles.position, p * DIMENSIONS + d)
                     for d in static_range(DIMENSIONS)
                 )
+                # a sphere, cut off outwards
                 outwards = tuple(load(particles.values, own + 2 + d) for d in static_range(DIMENSIONS))
                 cap = dot(dx, outwards) - load(particles.values, own + 1)
                 distance = max(sqrt(dot(dx, dx)) - load(particles.values, own), cap)

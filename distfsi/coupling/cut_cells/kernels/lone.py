@@ -152,6 +152,7 @@ def add_following(sums, n, lone: LonePoints, bins: Bins, velocity, grid: BlockGr
     one of them."""
     for v in range(2 + DIMENSIONS):
         sums[v] = 0.0
+    # particles in the same cell are no farther apart than a cell
     x = tuple(lone.position[n, d] for d in static_range(DIMENSIONS))
     bx, by, bz = bins_around(x, tuple(grid.spacing[d] for d in static_range(DIMENSIONS)), bins)
     for k in range(bz[0], bz[1]):
@@ -201,6 +202,7 @@ def add_work(paid, n, lone: LonePoints, bins: Bins, velocity, mass, impulse, gri
     """paid[n] (D + 1,) = impulse and work of all lone particles in the cell of one of them; returns the first of them,
     -1 if there is no fluid in the cell."""
     first = -1
+    # particles in the same cell are no farther apart than a cell
     x = tuple(lone.position[n, d] for d in static_range(DIMENSIONS))
     bx, by, bz = bins_around(x, tuple(grid.spacing[d] for d in static_range(DIMENSIONS)), bins)
     for k in range(bz[0], bz[1]):
@@ -225,7 +227,9 @@ def pay_drag(begin, end, lone: LonePoints, bins: Bins, velocity, mass, impulse, 
     for n in range(begin, end):
         for d in range(DIMENSIONS + 1):
             paid[n, d] = 0.0
+        # what all of a cell get
         first = add_work(paid, n, lone, bins, velocity, mass, impulse, grid)
+        # momentum and energy of its gas, once
         if first == n:
             at = lone.cell[n]
             filled = load(states.volume, volume_at(at, cells)) * cell_volume(grid)

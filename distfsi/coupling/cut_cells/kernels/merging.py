@@ -96,16 +96,19 @@ def best_target(walls: Walls, volume, at, first, offsets, sequences, grid: Block
     It is not small, one gets there, and it lies along the slope of the volume fractions, away from the wall. Of equal
     ones the first of the `offsets` counts.
     """
+    # away from the wall
     index = index_of(at, grid)
     slope = tuple(slope_of_fraction(walls, at, grid.steps[d]) for d in static_range(DIMENSIONS))
     steepness = sqrt(dot(slope, slope)) + 1e-12
     best, chosen = 0.0, -1
     for m in range(len(offsets)):
+        # neighbours with enough fluid
         if not is_in_grid(index, offsets[m], grid):
             continue
         step = step_to(offsets, m, grid)
         if usable_fraction(walls, volume, at + step, first + step) < SMALL:
             continue
+        # the more open and the more along the slope the better
         away = tuple(1.0 * offsets[m, d] for d in static_range(DIMENSIONS))
         length = sqrt(dot(away, away))
         cosine = dot(away, slope) / (length * steepness)
@@ -191,6 +194,7 @@ def find_receivers(begin, end, near, walls: Walls, target, grid: BlockGrid):
             at = cell_at(b, i, j, k, grid)
             if walls.kind[at] != ISOLATED:
                 continue
+            # the most open neighbour across an open face
             first, index, largest = first_value(at, DIMENSIONS, cells), index_of(at, grid), 0.0
             for axis in range(DIMENSIONS):
                 for side in range(2):

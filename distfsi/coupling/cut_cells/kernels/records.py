@@ -1,5 +1,5 @@
 """What the loops of the cut cells are given: the fluid of cells, what the wall leaves open of them, lists of cells, and
-what fluid and wall exchange. Fields are flat where nothing else is said; cells are named as in mesh/kernels/grid.py."""
+the loads on the wall. Fields are flat where nothing else is said; cells are named as in mesh/kernels/grid.py."""
 
 from typing import Any, NamedTuple
 
@@ -78,8 +78,8 @@ class Merging(NamedTuple):
     joined: Any
 
 
-class Exchange(NamedTuple):
-    """What fluid and wall give to each other in a step, in the cells of the band.
+class WallLoads(NamedTuple):
+    """How the wall moves in the cells of the band, and what the fluid gives to it in a step.
 
     velocity  (n, D) [m/s] of the wall
     inertia   (n,) [kg/m^d] sum of mass times kernel of the particles that make it

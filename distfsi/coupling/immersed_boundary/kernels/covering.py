@@ -83,8 +83,10 @@ def find_depth(begin, end, kind, occupied, offsets, counts, grid: BlockGrid):
     for b in range(begin, end):
         for c in range(3):
             counts[b, c] = 0
+        # blocks of fluid alone have none
         if occupied[b] == 0:
             continue
+        # count cells; those that no flux sees are deep
         for k in range(grid.extent[b, 2]):
             for j in range(grid.extent[b, 1]):
                 for i in range(grid.extent[b, 0]):
@@ -104,6 +106,7 @@ def list_cells(begin, end, kind, occupied, first, covered, deep, fresh, grid: Bl
     for b in range(begin, end):
         if occupied[b] == 0:
             continue
+        # where the block's part of each list begins, then cell by cell
         c, d, f = first[b, COVERED_CELLS], first[b, DEEP_CELLS], first[b, FRESH_CELLS]
         for k in range(grid.extent[b, 2]):
             for j in range(grid.extent[b, 1]):
