@@ -159,7 +159,7 @@ def test_a_marked_particle_is_followed(tubes):
     assert gauge["time [s]"][-1] == end
     assert gauge["position_y [m]"][-1] == columns["position"][row, 1]
     assert gauge["stress_zz [Pa]"][-1] == columns["stress"][row, 2]
-    assert gauge["plastic_strain"][-1] == columns["plastic_strain"][row]
+    assert gauge["pressure [Pa]"][-1] == columns["pressure"][row]
     assert gauge["position_x [m]"][-1] < gauge["position_x [m]"][0]
 
 

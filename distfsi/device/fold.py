@@ -583,6 +583,8 @@ class Fold(ast.NodeTransformer):
         out: list[ast.expr] = []
         stars = any(isinstance(argument, ast.Starred) for argument in call.args)
         wanted = [None] * len(call.args) if stars else [*parameters.values()]
+        if len(call.args) < len(wanted):  # a law without fields, bound by the scene, is not handed on
+            wanted = [class_ for class_ in wanted if class_ is None or fields_of(class_)]
         for k, argument in enumerate(call.args):
             record, class_ = self.record_of(argument), wanted[k] if k < len(wanted) else None
             if record is None and class_ is None:

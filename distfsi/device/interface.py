@@ -133,6 +133,9 @@ class Columns(MutableMapping[str, np.ndarray]):
     def __getitem__(self, name: str) -> np.ndarray:
         return self._pairs[name].host()
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._pairs  # without a copy to the host
+
     def __setitem__(self, name: str, host: np.ndarray) -> None:
         self._pairs[name] = DualArray(self.device, np.ascontiguousarray(host))
 
