@@ -258,7 +258,7 @@ def crack_energy(dimensions, spacing, angle=0.0, smoothing=1.3):
     """[J/m2] that a bar of steel takes when it is pulled apart, but for its motion afterwards."""
     length, width, speed = 12e-3, 4e-3, 1.0
     half = np.array([length, *[width] * (dimensions - 1)]) / 2
-    steel = (LinearEos(164e9), Elastic(80e9), None, PrincipalStress(250e6, 4e3, None))
+    steel = (LinearEos(164e9), Elastic(80e9), None, PrincipalStress(250e6, 4e3, Scatter(10.0, 0.05, 1)))
     bar = body(Box(tuple(-half), tuple(half)), spacing, 7850.0, (0.0,) * dimensions, *steel)
     bar = replace(bar, lattice_angle=angle)
     far = 4 * length
@@ -267,7 +267,7 @@ def crack_energy(dimensions, spacing, angle=0.0, smoothing=1.3):
     x = c["position"][:, 0]
     c["fixed"] = np.abs(x) > 0.5 * length - (2.0 * smoothing + 0.4) * spacing
     c["velocity"][:, 0] = np.where(c["fixed"], speed * np.sign(x), 2.0 * speed * x / length)
-    c["strength_scatter"][np.abs(x) < 1.5 * spacing] = 0.8
+    c["strength_scatter"] = np.where(np.abs(x) < 1.5 * spacing, 0.8, 1.0)  # it parts where we want it to
     moving, time = part.totals()["kinetic"], 0.0
     while time < 35e-6:
         time += step(part)[0]

@@ -7,7 +7,7 @@ call.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -52,10 +52,10 @@ def body_of(module: str) -> Callable:
             result = ir.VoidType() if not kinds else kinds[0] if len(kinds) == 1 else ir.LiteralStructType(kinds)
             function_type = ir.FunctionType(result, [leaf.type for leaf in leaves])
             called = builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), leaves)
-            if len(kinds) < 2:
-                return called if kinds else context.get_dummy_value()
-            parts = [builder.extract_value(called, k) for k in range(len(kinds))]
-            return context.make_tuple(builder, signature.return_type, parts)
+            if not kinds:
+                return context.get_dummy_value()
+            parts = [called] if len(kinds) == 1 else [builder.extract_value(called, k) for k in range(len(kinds))]
+            return _from_leaves(context, builder, signature.return_type, iter(parts))
 
         return _numba_type(returns)(arguments), code
 
@@ -114,3 +114,11 @@ def _leaves(context: Any, builder: Any, kind: types.Type, value: Any) -> Sequenc
     if isinstance(kind, types.Integer):
         return [context.cast(builder, value, kind, types.int64)]
     return [value]
+
+
+def _from_leaves(context: Any, builder: Any, kind: types.Type, leaves: Iterator[Any]) -> Any:
+    """The value of numba whose leaves come next."""
+    if not isinstance(kind, types.BaseTuple):
+        return next(leaves)
+    parts = [_from_leaves(context, builder, own, leaves) for own in kind.types]
+    return context.make_tuple(builder, kind, parts)
