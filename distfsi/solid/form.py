@@ -19,6 +19,9 @@ class SolidForm(Protocol):
     def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
         """Collective. Add the form's columns to those of particles at rest."""
 
+    def resume(self) -> None:
+        """The columns are those of a restart."""
+
     def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
         """Collective. Bring the column `piece` up to date, if there are bonds that make pieces."""
 

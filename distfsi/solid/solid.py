@@ -115,7 +115,7 @@ class Solid:
 
     def _form(self, scene: Scene) -> SolidForm:
         search = NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
-        if scene.solid.form == "total_lagrangian":
+        if any(scene.solid.form_of(body) == "total_lagrangian" for body in scene.solid.bodies):
             given = (self.communicator, scene.solid, self._points, self.dimensions)
             return TotalLagrangian(self.kernels, self.exchange, search, *given)
         repels = scene.solid.artificial_stress > 0.0
@@ -304,8 +304,9 @@ class Solid:
         self.label_pieces()
         if "piece" not in self.columns:
             return None
-        c = self._sorted("piece", "mass", "position", "velocity")
-        return pieces.table(c, self._block[self._order], self.blocks)
+        c, bonded = self._sorted("piece", "mass", "position", "velocity"), self.columns["piece"][self._order] >= 0
+        c = {name: column[bonded] for name, column in c.items()}
+        return pieces.table(c, self._block[self._order][bonded], self.blocks)
 
     def label_pieces(self) -> None:
         """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
@@ -334,6 +335,7 @@ class Solid:
             self.columns[name] = column
         self._home = None
         self.migrate()
+        self.form.resume()
         self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]
 

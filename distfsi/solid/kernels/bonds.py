@@ -47,7 +47,6 @@ from distfsi.solid.kernels.records import (
     BODY,
     CRACK,
     DAMAGE,
-    DEBRIS,
     DETACHING,
     DISPLACEMENT,
     EXPOSED,
@@ -55,6 +54,7 @@ from distfsi.solid.kernels.records import (
     RUPTURE_LENGTH,
     STIFFNESS,
     STRETCH,
+    UNBONDED,
     VOLUME,
     Bodies,
     BondedMaterial,
@@ -201,7 +201,7 @@ def pack_payload(begin, end, volume, body, cohesion: Cohesion, deformation, dama
         payload[i, NEIGHBOURHOOD_DAMAGE] = cohesion.neighbourhood_damage[i]
         payload[i, DETACHING] = 1.0 if cohesion.detaching[i] > 0 else 0.0
         payload[i, EXPOSED] = 1.0 if cohesion.exposed[i] > 0 else 0.0
-        payload[i, DEBRIS] = 1.0 if cohesion.bond_count[i] == 0 else 0.0
+        payload[i, UNBONDED] = 1.0 if cohesion.bond_count[i] <= 0 else 0.0
         payload[i, RUPTURE_LENGTH] = cohesion.rupture_length[i]
         payload[i, STRETCH] = own_stretch(deformation, damage, i)
         for d in static_range(DIMENSIONS):

@@ -13,11 +13,12 @@ from distfsi.solid.kernels.matrices import difference, matrix_of, store_vector, 
 from distfsi.solid.kernels.records import (
     CRACK,
     DAMAGE,
-    DEBRIS,
     DETACHING,
     DISPLACEMENT,
     NEIGHBOURHOOD_DAMAGE,
+    NEVER_BONDED,
     STRETCH,
+    UNBONDED,
     Bodies,
     Bonds,
 )
@@ -39,9 +40,10 @@ def mark_damaged(begin, end, damage, mark):
 
 @driver
 def mark_breaking(begin, end, bond_count, detaching, damage, mark):
-    """mark[i] = 1 where a particle has failed, detaches or is debris, else 0."""
+    """mark[i] = 1 where a particle that has or had bonds has failed, detaches or is debris, else 0."""
     for i in range(begin, end):
-        mark[i] = 1 if has_failed(damage, i) or detaching[i] > 0 or bond_count[i] == 0 else 0
+        breaking = has_failed(damage, i) or detaching[i] > 0 or bond_count[i] == 0
+        mark[i] = 1 if breaking and bond_count[i] != NEVER_BONDED else 0
 
 
 @driver
@@ -52,10 +54,10 @@ def mark_cut(begin, end, lost, mark):
 
 
 @driver
-def mark_debris(begin, end, payload, mark):
-    """mark[i] = 1 for debris, else 0."""
+def mark_unbonded(begin, end, payload, mark):
+    """mark[i] = 1 for debris and particles of bodies without bonds, else 0."""
     for i in range(begin, end):
-        mark[i] = 1 if payload[i, DEBRIS] > 0.0 else 0
+        mark[i] = 1 if payload[i, UNBONDED] > 0.0 else 0
 
 
 @driver
@@ -179,5 +181,6 @@ def cut_bonds(begin, end, position, reference, bodies: Bodies, body, payload, ke
                 rupture_length[i] = min(rupture_length[i], sqrt(dot(x, x)))
         for n in range(kept, bonds.count[i]):
             key[i, n] = -1
-        lost[i] = bonds.count[i] - kept
-        bonds.count[i] = kept
+        lost[i] = max(bonds.count[i], 0) - kept
+        if lost[i] > 0:
+            bonds.count[i] = kept

@@ -42,7 +42,7 @@ from distfsi.solid.formulas.stress import (
     von_mises,
 )
 from distfsi.solid.kernels.matrices import matrix_of, store_tensor, tensor_of
-from distfsi.solid.kernels.records import LawTables, MaterialPoints, RestState, Volumes
+from distfsi.solid.kernels.records import NEVER_BONDED, LawTables, MaterialPoints, RestState, Volumes
 
 
 @helper
@@ -153,7 +153,7 @@ def open_voids(begin, end, chosen, dt, body, eos, energy, volumes: Volumes, bond
     way beyond that is void, and must close again first. `eos` (bodies, …): the numbers of their laws."""
     for r in range(begin, end):
         i = chosen[r]
-        if has_failed(damage, i) or bond_count[i] == 0:
+        if bond_count[i] == 0 or (has_failed(damage, i) and bond_count[i] != NEVER_BONDED):
             law = tuple(eos[body[i], k] for k in static_range(EOS_FIELDS))
             divergence = trace(matrix_of(gradient, i))
             # All growth of the volume so far and in this step, of which the material takes what it can.
