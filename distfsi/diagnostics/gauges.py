@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.diagnostics.sampling import AXES, FluidSampler
+from distfsi.laws.registry import column_units
 from distfsi.mesh.blocks import Grid, Snapshot
 from distfsi.output.fields import FieldWriter
 from distfsi.output.history import History
@@ -20,9 +21,15 @@ from distfsi.scene import description
 
 STRESSES = ("xx", "yy", "zz", "xy", "yz", "xz")
 UNITS = {
-    "position": "m", "velocity": "m/s", "density": "kg/m3", "pressure": "Pa", "energy": "J/kg", "temperature": "K",
-    "von_mises": "Pa", "stress": "Pa",
-}  # fmt: skip
+    "position": "m",
+    "velocity": "m/s",
+    "density": "kg/m3",
+    "pressure": "Pa",
+    "energy": "J/kg",
+    "von_mises": "Pa",
+    "stress": "Pa",
+    **column_units(),
+}
 
 
 class Gauge(ABC):

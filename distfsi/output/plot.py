@@ -134,7 +134,8 @@ def _particle_colors(film: Film, numbers: Sequence[int], names: list[str], wante
         return None
     if wanted is not None and wanted not in (*present, "speed"):
         raise InputError([f"--particles {wanted}: no such field; there are speed, {', '.join(present)}"])
-    for name in [wanted] if wanted else ["plastic_strain", "speed"]:
+    usual = ["plastic_strain", "speed"] if "plastic_strain" in present else ["speed"]
+    for name in [wanted] if wanted else usual:
         extremes = [_extremes(values(frame.particles, name, 1)) for frame in film.frames(numbers, names)]
         if wanted or any(values.any() for values in extremes):
             break

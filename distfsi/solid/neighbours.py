@@ -91,10 +91,10 @@ class NeighbourSearch:
                 self._table = self._device.empty((own, self._width), np.int32)
             found = Neighbours(self._table, count)
             self._device.run(self._kernels.find_neighbours, own, *near, found)
-            most = self._rows.largest(count, 0)
-            if most <= self._width:
+            maximum = self._rows.largest(count, 0)
+            if maximum <= self._width:
                 return found
-            self._width = int(1.2 * most)
+            self._width = int(1.2 * maximum)
 
     def find_among(self, rows: Any, own: int, particles: Particles, key: Any, size: float) -> Neighbours:
         """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;

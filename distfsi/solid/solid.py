@@ -1,4 +1,4 @@
-"""The solid: smoothed particles, their motion and their books (paper, Sec. 2.1 and Appendix A).
+"""The solid: smoothed particles, their motion and their budget (paper, Sec. 2.1 and Appendix A).
 
 How particles act on each other is a matter of the solid's form: updated.py, total_lagrangian.py. A step needs
 three or four messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the
@@ -24,7 +24,7 @@ from distfsi.mesh.rows import Groups
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
-from distfsi.solid import neighbours, pieces, total_lagrangian, updated
+from distfsi.solid import fields, neighbours, pieces, total_lagrangian, updated
 from distfsi.solid.form import SolidForm
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.kernels import motion
@@ -47,7 +47,6 @@ DRIVERS = (
     *updated.DRIVERS,
     *total_lagrangian.DRIVERS,
 )
-SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
@@ -197,12 +196,12 @@ class Solid:
 
     def kick(self, dt: float) -> None:
         """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
-        c, booked = self.columns, self.team.empty((self.count, 1 + self.dimensions))
-        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), booked)
+        c, budget = self.columns, self.team.empty((self.count, 1 + self.dimensions))
+        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), budget)
         self._run(self.kernels.kick, dt, *given)
-        books = self._per_body(booked).sum(axis=1)
-        self._gravity_work += books[:, motion.WORK]
-        self._boundary_impulse += books[:, motion.IMPULSE :]
+        sums = self._per_body(budget).sum(axis=1)
+        self._gravity_work += sums[:, motion.WORK]
+        self._boundary_impulse += sums[:, motion.IMPULSE :]
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
@@ -225,13 +224,13 @@ class Solid:
         mean of before and after, exceeds the one that carried it.
         """
         c, device, D = self.columns, self.team, self.dimensions
-        excess, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
-        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, booked)
+        excess, budget = device.empty((self.count, D)), device.empty((self.count, 2 + D))
+        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, budget)
         self._run(self.kernels.apply_impulse, impulse, *given)
-        books = self._per_body(booked).sum(axis=1)
-        self.work, self.given = books[:, 0], self._per_body(impulse)
-        self._gravity_work += books[:, 1]
-        self._boundary_impulse += books[:, 2:]
+        sums = self._per_body(budget).sum(axis=1)
+        self.work, self.given = sums[:, 0], self._per_body(impulse)
+        self._gravity_work += sums[:, 1]
+        self._boundary_impulse += sums[:, 2:]
         return excess
 
     def migrate(self) -> None:
@@ -340,24 +339,8 @@ class Solid:
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,), and the stress (n, 6)
-        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all, by block, body and id."""
-        D, rows = self.dimensions, self._order if chosen is None else chosen
+        """This rank's particles for a field file (solid/fields.py); `chosen`: the rows wanted, by default all, by
+        block, body and id."""
+        rows = self._order if chosen is None else chosen
         c = {name: column[rows] for name, column in self.columns.items()}
-        vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
-        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.written)]
-        names += [name for name in ("piece", "dust") if name in c]
-        invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
-        return vectors | {name: c[name] for name in names} | invariant
-
-    def _cauchy_stress(self, columns: dict[str, np.ndarray]) -> np.ndarray:
-        """(n, 6) stress [Pa], tension positive; the normal stresses out of the plane share what makes the deviator's
-        trace vanish."""
-        deviator, D = columns["deviator"], self.dimensions
-        stress = np.zeros((len(deviator), 6))
-        stress[:, :D] = deviator[:, :D]
-        stress[:, D:3] = -deviator[:, :D].sum(axis=1, keepdims=True) / max(3 - D, 1)
-        stress[:, :3] -= columns["pressure"][:, None]
-        for column, component in zip(SHEARS[D], deviator[:, D:].T, strict=True):
-            stress[:, column] = component
-        return stress
+        return fields.outputs(c, self.materials.columns) | {"von_mises": self._von_mises(c["deviator"].T)}

@@ -6,7 +6,7 @@ from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS
 from distfsi.formulas.tensors import dot, times
-from distfsi.solid.formulas.bonds import crack_seen, is_face, most_stretched
+from distfsi.solid.formulas.bonds import crack_seen, is_face, maximum_stretch_direction
 from distfsi.solid.kernels.bonds import bond_weight
 from distfsi.solid.kernels.material import has_failed
 from distfsi.solid.kernels.matrices import difference, matrix_of, store_vector, vector_of
@@ -82,9 +82,9 @@ def crack_of(payload, i):
 
 @helper
 def crack_opening(deformation, bonds: Bonds, reference, bond_state, spacing, i):
-    """Vector to the crack of a particle that has failed: half a spacing along its most stretched direction, to the
+    """Vector to the crack of a particle that has failed: half a spacing along its direction of maximum stretch, to the
     side where its bonds are stretched more; 0 where it has bonds on one side only."""
-    axis = most_stretched(matrix_of(deformation, i))
+    axis = maximum_stretch_direction(matrix_of(deformation, i))
     across = times(matrix_of(deformation, i), axis)
     ahead, behind, length2_ahead, length2_behind = 0.0, 0.0, 0.0, 0.0
     for n in range(bonds.count[i]):

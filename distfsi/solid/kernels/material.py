@@ -65,6 +65,17 @@ def intact_deviator(point: MaterialPoints, law, damage, i):
     return tensor_of(point.deviator, i)
 
 
+@helper
+def grown_damage(laws: LawTables, memory: FailureMemory, width, own, load, dt, i):
+    """Damage after a load, which the failure model remembers with all else."""
+    law = tuple(laws.failure[own, k] for k in static_range(FAILURE_FIELDS))
+    known = tuple(memory[k][i] for k in static_range(FAILURE_COLUMNS))
+    found = failure_response(law, load, dt, width, known)
+    for k in static_range(FAILURE_COLUMNS):
+        memory[k][i] = found[k]
+    return found[0]
+
+
 @driver
 def deform(
     begin,
@@ -121,19 +132,15 @@ def deform(
         # Damage, and the stress that is carried.
         carried, open_share = 1.0, 1.0
         if FAILS:
-            law = tuple(laws.failure[own, k] for k in static_range(FAILURE_FIELDS))
             principal = scale * largest_principal(stress) - pressure
-            energy = crack_energy(scale * elastic, pressure, shear_modulus, rest.bulk_modulus[own])
+            energy = crack_energy(scale * elastic, pressure, shear_modulus, at_rest[1])
             kept = tuple(flowed[3 + k] for k in static_range(STRENGTH_COLUMNS))
             heat = homologous_temperature(strength, kept)
             factor = point.strength_scatter[i] if SCATTERED else 1.0
             load = (increment, flowed[0], pressure, principal, energy, state[1], heat, factor)
-            worn = tuple(failure_memory[k][i] for k in static_range(FAILURE_COLUMNS))
-            damaged = failure_response(law, load, dt, rest.crack_width[own], worn)
-            for k in static_range(FAILURE_COLUMNS):
-                failure_memory[k][i] = damaged[k]
-            open_share = 1.0 - damaged[0]
-            carried = carried_share(strength, pressure, damaged[0])
+            damage = grown_damage(laws, failure_memory, rest.crack_width[own], own, load, dt, i)
+            open_share = 1.0 - damage
+            carried = carried_share(strength, pressure, damage)
         for c in static_range(COMPONENTS):
             point.deviator[i, c] = carried * scale * stress[c]
         point.pressure[i] = pressure if pressure > 0.0 else open_share * pressure
