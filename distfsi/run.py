@@ -9,16 +9,19 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from distfsi.device.cpu import Team
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.interface import Device
+from distfsi.device.native import compilation
 from distfsi.device.nvrtc import CompileError
+from distfsi.device.timers import Timers
 from distfsi.diagnostics.budget import Budget
+from distfsi.diagnostics.performance import Performance
 from distfsi.direct import arrives, refusal
 from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.journal import Journal, set_aside
-from distfsi.output.picture import draw_summary
 from distfsi.output.progress import Progress
 from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
@@ -26,8 +29,10 @@ from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
+from distfsi.step import parts_of
 
 STEPS_BETWEEN_DEALS = 100
+STEPS_TO_COMPILE = 2  # the second one goes on from the state that the first one leaves
 
 
 def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
@@ -56,6 +61,17 @@ def _refuse(faults: list[str], communicator: Communicator) -> None:
         raise InputError(sorted(set(faults)))
 
 
+def compile_kernels(scene: Scene, communicator: Communicator) -> int:
+    """Compile what the first steps of a scene need; how many kernels were not yet on disk. Nothing is written."""
+    simulation = Simulation.of(scene, communicator)
+    budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
+    simulation.watch()
+    for _ in range(STEPS_TO_COMPILE):
+        simulation.step()
+    budget.summary(simulation)
+    return compilation.made
+
+
 def run(
     scene: Scene,
     communicator: Communicator,
@@ -82,14 +98,16 @@ def run(
         set_aside(directory, communicator)
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
-    journal = Journal(directory, scene, communicator, threads)
-    costs, device = None, gpu_of_rank(communicator, direct) if on_gpu else None
-    with requests, closing(progress), threadpool_limits(1), journal:
+    device = gpu_of_rank(communicator, direct) if on_gpu else Team(threads)
+    timers, costs = Timers(device), None
+    performance = Performance(parts_of(scene), timers, communicator)
+    journal = Journal(directory, scene, communicator, threads, performance.sums)
+    with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
-            simulation.asked = requests.strongest
+            simulation.requested, simulation.timers = requests.strongest, timers
             budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
-            records = Records(simulation, budget, files, origin)
+            records = Records(simulation, budget, performance, files, origin)
             kept = simulation.kept() | {"budget": budget, "records": records}
             if origin:
                 origin.restore(kept, simulation.blocks, communicator)
@@ -108,6 +126,8 @@ def run(
     fluid = simulation.fluid
     rest = f" {100 * fluid.share_at_rest():.0f} % of the tile stages were at rest." if fluid else ""
     progress.finish(f"{done} {budget.summary(simulation)}{rest}")
+    from distfsi.output.picture import draw_summary
+
     picture = on_root(communicator, directory / "summary.png", lambda: draw_summary(directory))
     if communicator.rank == 0:
         print(f"results in {directory}, picture in {picture}", flush=True)
@@ -126,13 +146,15 @@ def advance(
         alone = simulation.alone
         try:
             simulation.step()
-            saving = simulation.request is not Request.NOTHING and not simulation.done
+            request = simulation.last_step.request
+            saving = request is not Request.NOTHING and not simulation.done
             if saving:
-                simulation.check()
+                with simulation.timers("output"):
+                    simulation.check()
         except Diverged as error:
             records.write_fields()
             if simulation.is_valid():
-                records.write_restart({name: part.snapshot() for name, part in kept.items()})
+                records.write_restart(kept)
             raise Diverged(f"{error}\n{records.left_behind()}") from error
         if simulation.alone > alone:
             when = f"t = {simulation.time:.6g} s, after {simulation.steps} steps"
@@ -141,13 +163,13 @@ def advance(
         records.write(always=simulation.done)
         progress.update(simulation.steps, simulation.time, simulation.dt, simulation.limited_by)
         if saving:
-            path = records.write_restart({name: part.snapshot() for name, part in kept.items()})
+            path = records.write_restart(kept)
             requests.saved()
-            if simulation.request.stops:
+            if request.stops:
                 requests.remove_stop_file()
                 when = f"at t = {simulation.time:.6g} s after {simulation.steps} steps"
                 remedy = "the same command with --restart auto goes on"
-                raise Stopped(f"stopped {when} by {requests.words(simulation.request)}, state in {path}; {remedy}")
+                raise Stopped(f"stopped {when} by {requests.words(request)}, state in {path}; {remedy}")
         if simulation.steps % STEPS_BETWEEN_DEALS == 0 and simulation.communicator.size > 1:
             costs = balance.watch(simulation.scene.performance.imbalance)
             records.write_balance(balance.imbalance, changes_hands=costs is not None)

@@ -1,8 +1,7 @@
-"""The parts a scene needs, and the functions that advance them by one step."""
+"""A simulation: the parts that a scene needs, time, and the loop's view of a step (distfsi/step.py)."""
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,12 +10,16 @@ from typing import Any
 import numpy as np
 import psutil
 
-from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE, CutCells
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.cut_cells.cut_cells import CutCells
+from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
+from distfsi.coupling.protocol import Coupling, ReleasesFluid
 from distfsi.device.cpu import Team
 from distfsi.device.interface import Device
-from distfsi.diagnostics.gauges import Gauge, gauge_of
-from distfsi.diagnostics.peaks import Peaks, schlieren
+from distfsi.device.timers import Timers
+from distfsi.diagnostics.derived import DerivedFields
+from distfsi.diagnostics.gauges import GaugeRecorder
+from distfsi.diagnostics.peaks import Peaks
+from distfsi.diagnostics.schlieren import Schlieren
 from distfsi.errors import Diverged, StepFailed
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
@@ -26,90 +29,27 @@ from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 from distfsi.solid.solid import Solid
+from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
-COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": Coupling}
+COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": ImmersedBoundary}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 
-FLUID_LIMIT = "fluid CFL"
-SUB_STEP_SLACK = 1.1  # by how much the solid's limit may fall during its sub-steps
-ATTEMPTS = 8  # at a step, each with half the time step of the one before
-
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
-
-TimeStep = Callable[[], tuple[float, int]]  # [s], and in how many equal parts a coupled solid takes it
-
-
-def fluid_step(fluid: Fluid, time_step: TimeStep) -> float:
-    """Advance the fluid by one step and return it [s]; one that leaves no valid state is redone with half of it."""
-    dt, _ = time_step()
-    for attempt in range(ATTEMPTS):
-        if attempt:
-            fluid.reject()
-            dt *= 0.5
-        fluid.begin_step()
-        for stage in fluid.stages:  # paper, Eq. 16
-            fluid.advance_stage(stage, dt)  # MUSCL, HLLC, update and relaxation: Eqs. 11-30
-        if fluid.is_valid():
-            return dt
-    raise StepFailed(f"{ATTEMPTS} attempts failed, the last with a step of {dt:.3g} s")
-
-
-def solid_step(solid: Solid, time_step: TimeStep) -> float:
-    """Advance the solid by one step and return it [s]."""
-    solid.prepare()
-    dt, _ = time_step()
-    solid.advance(dt)  # Eqs. 5-7
-    solid.migrate()
-    return dt
-
-
-def coupled_step(fluid: Fluid, solid: Solid, coupling: Coupling, time_step: TimeStep) -> float:
-    """Advance fluid and solid together by one step and return it [s] (paper, Sec. 4 and Fig. 4)."""
-    solid.prepare(coupling.reach, coupling.stray)
-    dt = sub_cycle(solid, coupling, *time_step())  # Eqs. 5-7
-    coupling.update_geometry()
-    for stage in fluid.stages:
-        coupling.before_stage(stage)
-        fluid.advance_stage(stage, dt)
-        coupling.after_stage(stage, dt)
-    excess = solid.apply_impulse(coupling.transfer_impulse())  # Eq. 34
-    coupling.account_work(excess)
-    solid.migrate()
-    return dt
-
-
-def sub_cycle(solid: Solid, coupling: Coupling, dt: float, parts: int) -> float:
-    """Advance the solid by `dt` [s] in equal parts, with no force of the fluid meanwhile; how far it came [s].
-
-    That is less when its own limit has fallen below a part, or when another part would take it too far.
-    """
-    part, way = dt / parts, 0.0
-    for done in range(parts):
-        if done:
-            solid.prepare(coupling.reach, coupling.stray, goes_on=True)
-        if parts > 1:
-            rates = np.array([1.0 / solid.time_step()[0], 1.0 / coupling.time_step()])
-            solid_rate, wall_rate = part * solid.communicator.maximum(rates)
-            if done and not (solid_rate < SUB_STEP_SLACK and way + wall_rate < FARTHEST_MOVE / LARGEST_MOVE):
-                return done * part
-            way += wall_rate
-        solid.advance(part)
-    return dt
 
 
 @dataclass
 class Simulation:
     """The parts of a scene on this rank, and the step that advances them.
 
-    loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
-              was dropped, and the solid goes on alone
+    timers    count the parts of a step (distfsi/step.py)
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
-    sub_steps    that the solid was to make in the last step
-    solid_limit  rate [1/s] of the shortest step that a particle of this rank needs, and why
-    signals   of this rank's blocks of fluid [1/s] before the last step
-    asked     what this rank is asked for; looked at once in every step
-    request   the strongest of what all ranks were asked for in the last step: the same on all of them
+    derived   fields of the cells for the output files, beside those of the fluid
+    last_step   the step made last
+    limited_by  what set it, as far as is known without asking other ranks: with the cell or particle named last
+    loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
+              was dropped, and the solid goes on alone
+    requested     what this rank is asked for; looked at once in every step
     """
 
     scene: Scene
@@ -118,18 +58,16 @@ class Simulation:
     fluid: Fluid | None
     solid: Solid | None
     coupling: Coupling | None
-    watchers: list[Peaks | Gauge] = field(default_factory=list)
+    timers: Timers
+    watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
+    derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
     steps: int = 0
-    dt: float = 0.0
-    limited_by: str = "start"
+    last_step: TimeStep = TimeStep()
+    limited_by: str = str(Reason.START)
     loaded: bool = False
     alone: bool = False
-    sub_steps: int = 1
-    solid_limit: tuple[float, str] = (0.0, "")
-    signals: np.ndarray | None = None
-    asked: Callable[[], Request] = lambda: Request.NOTHING
-    request: Request = Request.NOTHING
+    requested: Callable[[], Request] = lambda: Request.NOTHING
 
     @classmethod
     def of(
@@ -145,16 +83,20 @@ class Simulation:
         `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
         """
         blocks = deal_blocks(scene, communicator, costs)
-        team = device or Team(threads or threads_of_rank(communicator))
+        device = device or Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, team.with_own_clock()) if scene.fluid else None
-        solid = Solid(scene, blocks, communicator, team.with_own_clock()) if scene.solid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
+        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
-        coupling = coupled(scene, model, fluid, solid, blocks, team.with_own_clock()) if fluid and solid else None
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling)
+        coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
         if scene.output.peaks:
-            simulation.watchers.append(Peaks(scene.output.peaks, fluid, coupling))
-        simulation.watchers += [gauge_of(gauge, simulation) for gauge in scene.gauges]
+            peaks = Peaks(scene.output.peaks, fluid, coupling)
+            simulation.watchers.append(peaks)
+            simulation.derived.append(peaks)
+        if scene.output.schlieren:
+            simulation.derived.append(Schlieren(fluid))
+        simulation.watchers += [GaugeRecorder(name, gauge, simulation) for name, gauge in scene.gauges.items()]
         return simulation
 
     @property
@@ -164,94 +106,65 @@ class Simulation:
 
     def step(self) -> None:
         """Advance everything by one step."""
-        parts = [self.solid] if self.alone else self.parts
-        step = coupled_step if self.coupled else fluid_step if self.flows else solid_step
-        rejected = self.rejected_steps
         try:
-            self.dt = step(*parts, self.time_step)
+            made = self._advance()
         except Diverged as error:
             faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
             if isinstance(error, StepFailed):
                 self.fluid.reject()
                 raise Diverged(f"{faults[0]}; {error}") from error
             raise Diverged(faults[0] + (NOT_REDONE if self.coupling else "")) from error
-        if self.rejected_steps > rejected:
-            self.limited_by = "rejected step"
-        if self.coupled and self.solid.sub_steps < self.sub_steps:
-            self.limited_by = "sub-steps of the solid"
-        self.time += self.dt
+        if made.reason is not self.last_step.reason:
+            self.limited_by = str(made.reason)
+        self.last_step = made
+        self.time += made.dt
         self.steps += 1
         self.watch()
-        if self.coupled and self.scene.coupling.drop_below is not None:
-            self._end_loads(self.scene.coupling.drop_below)
+        minimum = self.scene.coupling.drop_below
+        if minimum is not None and not self.alone and isinstance(self.coupling, ReleasesFluid):
+            self._end_loads(self.coupling, minimum)
+
+    def _advance(self) -> TimeStep:
+        """Plan a step and make it."""
+        fluid, solid, coupling = self._active
+        find_forces(solid, coupling, self.timers)
+        return make_step(fluid, solid, coupling, self.time_step(), self.timers)
+
+    def time_step(self) -> TimeStep:
+        """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
+        given = (self.time, self.scene.time, self.requested(), self.communicator, self.timers)
+        with self.timers("time step"):
+            return time_step(*self._active, *given)
 
     @property
-    def flows(self) -> bool:
-        """Whether there is a fluid that is computed."""
-        return self.fluid is not None and not self.alone
+    def dt(self) -> float:
+        """[s] of the last step; 0 before the first."""
+        return self.last_step.dt
 
     @property
-    def coupled(self) -> bool:
-        """Whether fluid and solid act on each other."""
-        return self.coupling is not None and not self.alone
+    def _active(self) -> tuple[Fluid | None, Solid | None, Coupling | None]:
+        """Fluid, solid and coupling as far as they are computed."""
+        return (None, self.solid, None) if self.alone else (self.fluid, self.solid, self.coupling)
 
-    def _end_loads(self, least: float) -> None:
-        """Collective. Drop the fluid when it pressed on the solid by `least` [Pa] and does no more."""
-        pressure = self.coupling.pressure(self.dt)
-        self.loaded = self.loaded or pressure >= least
-        if self.loaded and pressure < least:
+    def _end_loads(self, coupling: ReleasesFluid, minimum: float) -> None:
+        """Collective. Drop the fluid when it pressed on the solid by `minimum` [Pa] and does no more."""
+        pressure = coupling.pressure(self.dt)
+        self.loaded = self.loaded or pressure >= minimum
+        if self.loaded and pressure < minimum:
             self.alone = True
-            self.coupling.let_fluid_leave()
+            coupling.let_fluid_leave()
             self.solid.given[:] = 0.0
-
-    @property
-    def rejected_steps(self) -> int:
-        """How many steps have been redone with a smaller time step."""
-        return self.fluid.rejected_steps if self.fluid else 0
 
     def watch(self) -> None:
         """Show the state to the watchers: once before the first step, then after each."""
-        for watcher in self.watchers:
-            watcher.after_step(self)
-
-    def time_step(self) -> tuple[float, int]:
-        """The longest stable step [s] of all parts on all ranks, and in how many parts the solid takes it. Raises
-        Diverged when a part has no valid state."""
-        signal = self.fluid.fastest_signal() if self.flows else 0.0
-        self.signals = self.fluid.signals.copy() if self.flows else None
-        solid_dt, solid_reason = self.solid.time_step() if self.solid else (np.inf, "")
-        wall_dt = self.coupling.time_step() if self.coupled else np.inf
-        self.solid_limit = 1.0 / solid_dt, solid_reason
-        rates = np.array([signal / self.scene.time.cfl, 1.0 / solid_dt, 1.0 / wall_dt, self.asked()])
-        fluid_rate, solid_rate, wall_rate, request = self.communicator.maximum(rates)
-        self.request = Request(int(request))
-        if not np.isfinite(fluid_rate) or not np.isfinite(solid_rate):
-            raise Diverged("there is no stable time step")
-        parts = self.coupling.sub_steps if self.coupled else 1
-        if solid_rate / parts > max(fluid_rate, wall_rate):
-            self.limited_by = self.name_solid_limit()
-        else:
-            named = self.limited_by.startswith(FLUID_LIMIT)
-            limit = self.limited_by if named else FLUID_LIMIT
-            self.limited_by = limit if fluid_rate >= wall_rate else "wall speed"
-        dt = 1.0 / max(fluid_rate, solid_rate / parts, wall_rate)
-        left = self.scene.time.end - self.time
-        if dt >= left:
-            self.limited_by = "end time"
-        dt = min(dt, left)
-        self.sub_steps = max(1, math.ceil(dt * solid_rate * (1.0 - 1e-12)))
-        return dt, self.sub_steps
-
-    def name_solid_limit(self) -> str:
-        """Collective. What bounds the solid's steps."""
-        return max(self.communicator.allgather(self.solid_limit), key=lambda limit: limit[0])[1]
+        with self.timers("output"):
+            for watcher in self.watchers:
+                watcher.after_step(self)
 
     def name_limit(self) -> str:
         """Collective. What set the last time step; if the fluid did, where it was fastest and how fast. Progress tells
         it until the next step that is limited otherwise, or asked for."""
-        if self.limited_by.startswith(FLUID_LIMIT):
-            cells = self.communicator.allgather(self.fluid.fastest_cell(self.signals))
-            self.limited_by = f"{FLUID_LIMIT}, {max(cells, key=lambda cell: (cell[0], *cell[1]))[2]}"
+        self.limited_by = self.last_step.name_reason(self.fluid, self.communicator)
         return self.limited_by
 
     def check(self) -> None:
@@ -302,11 +215,8 @@ class Simulation:
         """Collective. Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
-        for watcher in self.watchers:
-            if isinstance(watcher, Peaks):
-                cells |= watcher.outputs(covered)
-        if self.scene.output.schlieren:
-            cells["schlieren"] = schlieren(self.fluid, covered)
+        for derived in self.derived:
+            cells |= derived.outputs(covered)
         if self.solid is None:
             return cells, None
         self.solid.label_pieces()

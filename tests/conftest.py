@@ -1,6 +1,5 @@
 """What several test modules share, and how their tests are dealt to processes."""
 
-import gc
 from collections.abc import Callable
 
 import pytest
@@ -27,13 +26,6 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of a file stay together; those that start ranks all in one process: they need both cores for themselves."""
     for item in items:
-        starts_ranks = "mpiexec" in item.fixturenames or hasattr(item.module, "run_ranks")
+        starters = ("run_ranks", "run_case")
+        starts_ranks = "mpiexec" in item.fixturenames or any(hasattr(item.module, name) for name in starters)
         item.add_marker(pytest.mark.xdist_group("ranks" if starts_ranks else item.path.stem))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled_stays_out_of_collections():
-    """What numba keeps of each kernel are millions of objects, which every collection of garbage would look at."""
-    yield
-    gc.collect()
-    gc.freeze()

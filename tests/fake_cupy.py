@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import time as clock
 from collections import Counter
 from types import ModuleType, SimpleNamespace
 
@@ -37,6 +38,22 @@ class Array:
         out[...] = self._memory
 
 
+class Event:
+    """A cupy.cuda.Event that has been recorded."""
+
+    def __init__(self):
+        self.time, self.waited_for = clock.perf_counter(), False
+
+    def synchronize(self):
+        self.waited_for = True
+
+
+def elapsed(first, then):
+    """[ms] as cupy.cuda.get_elapsed_time."""
+    assert then.waited_for
+    return 1e3 * (then.time - first.time)
+
+
 class Stream:
     """A cupy.cuda.Stream."""
 
@@ -52,10 +69,10 @@ class Stream:
         Stream.current.pop()
 
     def record(self):
-        return "event"
+        return Event()
 
     def wait_event(self, event):
-        assert event == "event"
+        assert isinstance(event, Event)
 
     def synchronize(self):
         calls["synchronize"] += 1
@@ -111,7 +128,7 @@ def install(monkeypatch, gpus=2):
     runtime = SimpleNamespace(getDeviceCount=lambda: gpus, getDeviceProperties=lambda ordinal: properties)
     cupy, cupyx = ModuleType("cupy"), ModuleType("cupyx")
     cupy.ndarray, cupy.empty, cupy.zeros, cupy.RawModule = Array, empty, zeros, RawModule
-    cupy.cuda = SimpleNamespace(Stream=Stream, Device=device, runtime=runtime)
+    cupy.cuda = SimpleNamespace(Stream=Stream, Device=device, runtime=runtime, get_elapsed_time=elapsed)
     cupyx.empty_pinned = np.empty
     monkeypatch.setitem(sys.modules, "cupy", cupy)
     monkeypatch.setitem(sys.modules, "cupyx", cupyx)

@@ -6,6 +6,7 @@ from distfsi.fluid.model import FluidModel, fluid_model
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
 from distfsi.scene.description import Fluid, Phase
 
 AIR = IdealGas(1.4)
@@ -19,11 +20,10 @@ TRACE = 1e-6
 
 
 def model_of(
-    *names: str, dimensions: int = 1, gravity=None, limiter: str = "minmod", riemann: str = "hllc", **method
+    *names: str | FluidEos, dimensions: int = 1, sources=(), limiter: str = "minmod", riemann: str = "hllc", **method
 ) -> FluidModel:
-    """The model of a fluid made of `MATERIALS`."""
-    phases = tuple(Phase(name, MATERIALS[name]) for name in names)
+    """The model of a fluid made of `MATERIALS`, or of other laws."""
+    phases = tuple(Phase(str(name), name if isinstance(name, FluidEos) else MATERIALS[name]) for name in names)
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
     domain = SimpleNamespace(dimensions=dimensions)
-    gravity = gravity or (0.0,) * dimensions
-    return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, gravity=gravity))
+    return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, sources=sources))

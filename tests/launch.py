@@ -16,7 +16,6 @@ ROOT = Path(__file__).parent.parent
 # One compute thread per rank; and what Open MPI needs to start more ranks than cores, or as root.
 ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
-    "NUMBA_NUM_THREADS": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",

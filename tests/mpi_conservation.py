@@ -9,10 +9,10 @@ import json
 import sys
 from dataclasses import replace
 
-from distfsi.commands.bench_ranks import measure
-from distfsi.commands.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
 from distfsi.diagnostics.budget import Budget
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
+from distfsi.resources.bench_ranks import measure
+from distfsi.resources.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
 from distfsi.scene.description import Performance, Scene
 from distfsi.simulation import Simulation
 from mpi_rest import cells_of

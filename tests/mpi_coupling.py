@@ -65,7 +65,6 @@ class Coupled:
             title="test",
             domain=d.Domain(lower, upper, cells, kinds),
             time=d.Time(1e9, cfl, None, scheme=runge_kutta),
-            gravity=(0.0,) * D,
             fluid=d.Fluid(phases, regions, "minmod", 1e-6, ((None, None),) * D, precision),
             solid=d.Solid(tuple(bodies), 1.3, 1.0, 2.0, form=form),
             output=d.Output("", 0.0, 1),
@@ -90,7 +89,7 @@ class Coupled:
             *t["momentum"] - solid.boundary_impulse(),
             t["kinetic"] + t["internal"],
         ]
-        created = sum(coupling.ledger().values())
+        created = sum(coupling.budget_by_cause().values())
         return fluid.totals(coupling.volume)[0] + fluid.left_domain() + np.array(particles) - created
 
     def grid_of(self, field):
@@ -190,9 +189,9 @@ def main():
                 coupled.step()
                 sub_steps += coupled.solid.sub_steps
                 scale = max(scale, np.abs(coupled.fluid.totals()[0]).max())
-            ledger = coupled.coupling.ledger()
+            created = coupled.coupling.budget_by_cause()
             assert np.abs(coupled.balance() - before).max() < 1e-12 * scale
-            made = {cause: np.abs(amounts[-1]) for cause, amounts in ledger.items()}
+            made = {cause: np.abs(amounts[-1]) for cause, amounts in created.items()}
             if case is stretched_plate:  # it reaches through the ends of the domain, and pushes against them
                 assert all(np.isfinite(amount) for amount in made.values())
             elif scheme == "paper":
@@ -204,7 +203,7 @@ def main():
         assert digests[0] == digests[1], case.__name__
         if communicator.rank == 0:
             print(
-                scheme, case.__name__, digests[0], [amounts.tobytes().hex() for amounts in ledger.values()], flush=True
+                scheme, case.__name__, digests[0], [amounts.tobytes().hex() for amounts in created.values()], flush=True
             )
 
 

@@ -116,7 +116,7 @@ def coupled_state(simulation):
     """What there is of it."""
     fluid, coupling = simulation.fluid, simulation.coupling
     cells = [fluid.cells(block).copy() for block in range(simulation.blocks.local_count)]
-    books = [*fluid.totals(coupling.volume), *coupling.ledger().values(), np.array([simulation.time])]
+    books = [*fluid.totals(coupling.volume), *coupling.budget_by_cause().values(), np.array([simulation.time])]
     peaks = simulation.watchers[0].snapshot()["cells"]["fields"]
     columns = [column.copy() for column in simulation.solid.columns.values()]
     return [*cells, peaks.copy(), *columns, *books]
@@ -270,16 +270,16 @@ def without_wait_of_get(gpu):
 
 MUTANTS = {
     "the wait before messages": without("finish_asynchronous"),
-    "the copy of what is sent": without("take"),
-    "the copy of what came": without("put"),
+    "the copy of what is sent": without("download_to"),
+    "the copy of what came": without("upload"),
     "the wait for the ghosts": without_order(Queue.MAIN),
     "the wait for the cells": without_order(Queue.ASYNCHRONOUS),
     "the wait before looking": without_wait_of_get,
 }
 SOLID_MUTANTS = {
     "the wait before messages": without("finish_asynchronous"),
-    "the copy of what is sent": without("take"),
-    "the copy of what came": without("put"),
+    "the copy of what is sent": without("download_to"),
+    "the copy of what came": without("upload"),
     "the wait for the ghosts": without_order(Queue.MAIN),
 }
 

@@ -115,9 +115,7 @@ def random_grid(rng):
 
 
 def check_ghosts(communicator):
-    import numba
-
-    copy = numba.njit(nogil=True, cache=False)(copy_regions)
+    copy = Team.build([copy_regions], {}).copy_regions
     rng = np.random.default_rng(1)
     for _ in range(60):
         check_ghost_cells(communicator, copy, *random_grid(rng))

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 from distfsi.simulation import Simulation
 
 

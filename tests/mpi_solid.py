@@ -15,6 +15,7 @@ from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
 from distfsi.laws.solid.scatter import Scatter
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
@@ -38,7 +39,7 @@ def solid(
     symmetric=(),
     team=None,
     block_cells=4,
-    gravity=None,
+    sources=(),
     viscosity=(1.0, 2.0),
     form="updated_lagrangian",
     communicator=None,
@@ -52,7 +53,7 @@ def solid(
         title="test",
         domain=d.Domain(lower, upper, (16,) * D, kinds),
         time=d.Time(1.0, 0.5, None),
-        gravity=gravity or (0.0,) * D,
+        sources=sources,
         fluid=None,
         solid=d.Solid(tuple(bodies), smoothing, *viscosity, form=form, artificial_stress=artificial_stress),
         output=d.Output("", 0.0, 1),
@@ -96,7 +97,7 @@ def colliding_discs(team, communicator=None):
     clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
     right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
     box = (-1.0, 0.0), (1.0, 1.0), (1,)
-    return solid([left, right], *box, team, 2, gravity=(0.0, -1e3), communicator=communicator), 60
+    return solid([left, right], *box, team, 2, sources=(Gravity((0.0, -1e3)),), communicator=communicator), 60
 
 
 def colliding_balls(team):

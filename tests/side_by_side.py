@@ -1,4 +1,4 @@
-"""Every call of a kernel made twice: by numba, and by its CUDA C on the host. All arrays must come out with the same
+"""Every call of a kernel made twice: on the CPU, and by its CUDA C on the host. All arrays must come out with the same
 bits."""
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class SideBySide:
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, but_for: Sequence[str] = ()):
-        """Kernels `but_for` those named are run by numba alone."""
+        """Kernels `but_for` those named are run on the CPU alone."""
         self.calls, self.unlike, self.but_for = Counter(), Counter(), but_for
         self._build = cpu.build
         monkeypatch.setattr(cpu.Team, "build", self.build)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from distfsi.__main__ import main
-from distfsi.commands.check import report
+from distfsi.commands.line import main
 from distfsi.errors import InputError
+from distfsi.resources.report import report
 from distfsi.scene import load
 from launch import ROOT
 
@@ -33,9 +33,9 @@ BROKEN = [
     ("[domain", ["is no TOML"]),
     ("title = 'a'\ntitle = 'b'", ["is no TOML"]),
     (changed(SOD, ("[domain]", "[domian]")), ["did you mean 'domain'?"]),
-    (changed(SOD, ("lower", "")), ["domain.lower (line 9): is missing; expected low corner [m]"]),
+    (changed(SOD, ("lower", "")), ["domain.lower (line 12): is missing; expected low corner [m]"]),
     (changed(SOD, ("lower", 'lower = "1 s"')), ["has units s, needs m"]),
-    (changed(SOD, ("lower", "lower = 2")), ["domain.upper (line 11): must be greater than lower along x"]),
+    (changed(SOD, ("lower", "lower = 2")), ["domain.upper (line 14): must be greater than lower along x"]),
     (changed(SOD, ("upper", "upper = nan")), ["is not finite"]),
     (changed(SOD, ("upper", "upper = true")), ["is no number"]),
     (changed(SOD, ("cells", "cells = 0")), ["must be >= 1"]),
@@ -61,7 +61,7 @@ BROKEN = [
     (changed(SOD, ("phase", 'phase = "gsa"')), ["did you mean 'gas'?"]),
     (changed(SOD, ("[fluid.phases", "[fluid]\nsharpening = true\n[fluid.phases.gas]")), ["needs an interface"]),
     (changed(SOD, ("density", "density = 0")), ["must be > 0"]),
-    (changed(SOD, ("density", "density = 1\nvolume_fraction = 0.5")), ["volume_fraction (line 24): needs two phases"]),
+    (changed(SOD, ("density", "density = 1\nvolume_fraction = 0.5")), ["volume_fraction (line 27): needs two phases"]),
     (changed(BUBBLE, ("density", "density = 1\nvolume_fraction = 1e-9")), ["expected 1e-06 to 1 - 1e-06"]),
     (changed(SOD, ("density", 'density = "1 kg"')), ["has units kg, needs kg/m3"]),
     (changed(SOD, ("pressure", "")), ["give either pressure or energy"]),
@@ -98,7 +98,7 @@ BROKEN = [
     (changed(PLATES, ("[solid.bodies.right]", "[solid.bodies.left]")), ["is no TOML"]),
     (
         changed(PLATES, ("[solid.bodies.left]", "[solid]\nartificial_stress = 0.3\n[solid.bodies.left]")),
-        ["solid.artificial_stress (line 20): bonds cannot clump; it needs form"],
+        ["solid.artificial_stress (line 23): bonds cannot clump; it needs form"],
     ),
     (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "-10 mm", upper = "1 mm"}')), ["overlaps body 'left'"]),
     (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "1 m", upper = "2 m"}')),

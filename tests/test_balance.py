@@ -15,7 +15,7 @@ PROGRAM = """
 import sys
 import numpy as np
 from distfsi import run
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 
 random = np.random.default_rng(7)  # the same on all ranks
 

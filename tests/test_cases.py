@@ -1,11 +1,8 @@
 """The cases of the paper as studies that users run, coarse here; `-m full` runs them finer."""
 
-from importlib import import_module
-
 import numpy as np
 import pytest
 
-from distfsi.__main__ import STUDIES, parser
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.scene import load
@@ -15,12 +12,6 @@ from distfsi.study.tracks import crossing, velocity, write_tracks
 
 PLATEAUS = {0.5: (0.5, 0.6, 0.7, 0.8), 0.4: (0.4, 0.5, 0.6, 0.7)}  # radii where nothing changes fast [m]
 MACH = 1.22
-
-
-def test_studies_are_modules_with_a_main():
-    for name in STUDIES:
-        assert parser().parse_args(["study", *name.split()]).name == name.split()
-        assert callable(import_module(f"distfsi.study.{name.replace(' ', '_')}").main)
 
 
 # ---- tracks ----------------------------------------------------------------------------------------------------------

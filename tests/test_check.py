@@ -8,14 +8,14 @@ import sys
 import numpy as np
 import pytest
 
-from distfsi.commands import bench
-from distfsi.commands.check import report
-from distfsi.commands.resources import Resources
-from distfsi.commands.works import SMALLEST, blast_on_copper, gases
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
+from distfsi.resources import bench
+from distfsi.resources.estimate import Resources
+from distfsi.resources.report import report
+from distfsi.resources.works import SMALLEST, blast_on_copper, gases
 from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.advice import advice
@@ -52,7 +52,7 @@ def test_every_example_gets_a_report_without_advice(path):
     assert [text for text in advised(scene) if not known or known not in text] == []
     for name in ("domain", "blocks", "memory", "output", "steps", "time"):
         assert f"\n  {name} " in text
-    assert "python -m distfsi bench" in text
+    assert "distfsi bench" in text
 
 
 def test_the_report_counts_what_the_scene_holds():
@@ -160,7 +160,7 @@ def test_all_blocks_and_particles_are_counted_on_any_number_of_ranks():
 
 MEMORY = """
 import os, resource, sys
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 main(["run", *sys.argv[1:]])
 line = f"peak {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}\\n"
 os.write(1, line.encode())  # at once: ranks share the pipe

@@ -92,7 +92,7 @@ def test_a_shock_pushes_a_wall_with_its_reflected_pressure(dimensions):
     force = impulse / dt / math.prod(upper[1:])
     assert force[0] == pytest.approx(reflected - 1.0, rel=5e-3)  # the gas behind the wall pushes back with 1
     assert np.abs(force[1:]).max(initial=0.0) < 1e-12
-    made = coupled.coupling.ledger()["wall"]
+    made = coupled.coupling.budget_by_cause()["wall"]
     assert np.abs(made[1:-1]).max() < 1e-13
     assert np.abs(coupled.balance() - before).max() < 1e-12
 
@@ -133,9 +133,9 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
     before = coupled.balance()
     for _ in range(40):
         coupled.step()
-    ledger = coupled.coupling.ledger()
+    created = coupled.coupling.budget_by_cause()
     assert np.abs(coupled.balance() - before).max() < 1e-12 * before.max()
-    assert ledger["covered"][-1] < 0.0 < ledger["fresh"][-1]
+    assert created["covered"][-1] < 0.0 < created["fresh"][-1]
 
 
 def burst(lower, symmetric):
@@ -148,7 +148,7 @@ def burst(lower, symmetric):
     before, size = coupled.balance(), 0.0
     for _ in range(60):
         coupled.step()
-        size = max(size, np.abs(coupled.coupling.ledger()["sides"]).max())
+        size = max(size, np.abs(coupled.coupling.budget_by_cause()["sides"]).max())
     assert np.abs(coupled.balance() - before).max() < 1e-12 * (size + before[-1])
     covered = coupled.covered[0, -20:, -20:]
     state = np.where(covered, 0.0, coupled.grid_of(coupled.fluid.state)[:, 0, -20:, -20:])

@@ -1,14 +1,23 @@
-"""The CUDA C of every kernel, run on the host, gives the bits of numba: in whole scenes, call by call."""
+"""The CUDA C of every kernel, run on the host, gives the bits of the CPU: in whole scenes, call by call."""
 
 import pytest
 
-from distfsi.coupling.cut_cells.kernels import dust, images, wall_distance
-from distfsi.coupling.cut_cells.kernels import fluxes as cut_fluxes
-from distfsi.coupling.cut_cells.kernels import forces as cut_forces
-from distfsi.coupling.cut_cells.kernels import geometry as cut_geometry
-from distfsi.coupling.cut_cells.kernels import redistribution as cut_cells
-from distfsi.coupling.immersed_boundary import kernels as coupling
-from distfsi.coupling.kernels import spreading as push
+from distfsi.coupling.cut_cells.kernels import (
+    band,
+    fluxes,
+    forces,
+    fractions,
+    images,
+    inflation,
+    lone,
+    merging,
+    nodal_distance,
+    particles,
+    redistribution,
+    volumes,
+)
+from distfsi.coupling.immersed_boundary.kernels import covering, states
+from distfsi.coupling.kernels import spreading
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
@@ -21,11 +30,12 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_unbonded", "open_voids")
 NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "carry_unbonded", "keep_rates")
 FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
-CUT_CELLS = (cut_cells, cut_fluxes, cut_forces, cut_geometry, dust, images, push, wall_distance)
-SCHEMES = {"paper": (coupling, push), "cut_cells": CUT_CELLS}
+CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
+CUT_CELLS += (redistribution, spreading, volumes)
+SCHEMES = {"paper": (covering, spreading, states), "cut_cells": CUT_CELLS}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
-OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"close_stairs", "round_parts"}}
-OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_evicted"}  # no cell is small before it is shut
+OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"push", "round_apertures", "round_fractions"}}
+OF_OTHER_SCHEMES["stairs"] = {"push", "absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
 ALWAYS |= {"find_neighbours", "apply_impulse"}
 

@@ -10,11 +10,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from distfsi.device import cpu, emit, runtime
+from distfsi.device import cpu, emit
+from distfsi.device.fingerprint import fingerprint
 from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
+from distfsi.device.llvm_text import module_of
+from distfsi.device.llvm_types import REALS
 from distfsi.device.markers import driver, helper, load, row, store, workspace
+from distfsi.device.native import Native
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import Symbol, chosen
 from launch import ROOT
@@ -38,9 +42,15 @@ def _own_cache(tmp_path_factory, monkeypatch):
     monkeypatch.setenv("DISTFSI_CACHE", str(tmp_path_factory.getbasetemp() / "kernels"))
 
 
+def types_of(function, real="float64"):
+    """Of reals only."""
+    return (REALS[real],) * function.__code__.co_argcount
+
+
 def text_of(function, constants=None, bindings=None, real="float64"):
-    text, _ = emit.numba_text(function, constants or {}, bindings or {}, real, runtime.VERSION)
-    return text
+    constants, bindings = constants or {}, bindings or {}
+    types = types_of(function, real) + (REALS[real],) * len(Native(function, constants, bindings, real).numbers())
+    return module_of(function, constants, bindings, real, types)[0].text()
 
 
 def body_of(function, **constants):
@@ -131,6 +141,11 @@ def calls_a_constant(x):
     return x * slope + level
 
 
+def drops_a_constant(x):
+    level, slope = constant_pair(x)
+    return x + slope
+
+
 def scaled(x):
     return GAMMA * x
 
@@ -190,7 +205,7 @@ def test_generators_and_stars_are_written_out():
     constants = {"N": 3, "WEIGHTS": (1.0, 2.0, 4.0)}
     assert both(generators, 3.0, constants=constants) == (21.0, 3.0, 6.0, 12.0, 3.0, 6.0, 42.0)
     assert both(star_in_a_call, 1.0, constants=constants) == 421.0
-    nodes = list(ast.walk(ast.parse(text_of(generators, constants))))
+    nodes = list(ast.walk(ast.parse("\n".join(body_of(generators, **constants)[:-1]))))
     assert not [node for node in nodes if isinstance(node, (ast.For, ast.GeneratorExp, ast.Starred))]
 
 
@@ -208,7 +223,11 @@ def test_a_callee_that_returns_a_constant_is_inlined():
     constants = {"GAMMA": 4.0}
     assert body_of(calls_a_constant, **constants) == ["return numbers_[0]"]
     assert both(calls_a_constant, 1.0, constants=constants) == -2.0
-    assert "constant_pair" not in text_of(calls_a_constant, constants).split("def calls_a_constant")[1]
+    assert "constant_pair" not in text_of(calls_a_constant, constants)
+
+
+def test_numbers_that_vanish_are_not_given():
+    assert both(drops_a_constant, 1.0, constants={"GAMMA": 4.0}) == 1.0
 
 
 def test_bound_formulas_keep_their_own_constants():
@@ -225,14 +244,14 @@ def test_bound_formulas_keep_their_own_constants():
         "scaled__first_material",
         "scaled__second_material",
     ):
-        assert text.count(f"def {name}(") == 1
+        assert text.count(f"define internal double @{name}.") == 1
 
 
 def test_a_formula_used_twice_is_emitted_once():
     bindings = {"first_material": Bound(scaled), "second_material": Bound(scaled)}
     text = text_of(two_materials, {"GAMMA": 3.0}, bindings)
     assert both(two_materials, 2.0, constants={"GAMMA": 3.0}, bindings=bindings) == 0.0
-    assert text.count("def two_materials(") == text.count("def scaled__first_material(") == 1
+    assert text.count("@two_materials.0(") == text.count("define internal double @scaled__first_material.") == 1
 
 
 def test_choices_mean_the_same_as_in_python():
@@ -333,12 +352,8 @@ def many_literals(x):
 def test_single_precision_stays_single():
     constants = {"SWITCH": True, "WEIGHTS": (1.5,)}
     text = text_of(many_literals, constants, real="float32")
-    code = "\n".join(line for line in text.splitlines() if not line.startswith(("#", "c")))
-    assert not [n for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant) and isinstance(n.value, float)]
-    compiled = cpu.build([many_literals], constants, real="float32").many_literals
-    compiled(np.float32(0.3))
-    (signature,) = compiled.dispatcher.nopython_signatures
-    assert {str(kind) for kind in signature.return_type} == {"float32"}
+    assert not [line for line in text.splitlines() if "double" in line and not line.startswith("declare")]
+    assert module_of(many_literals, constants, {}, "float32", ("float", "float"))[1].returns == ("float", "float")
 
 
 @row
@@ -636,6 +651,10 @@ def arithmetic_of_numbers(x):
     return x * (1.0 / GAMMA) + (GAMMA - 1.0) * -GAMMA / 2.0
 
 
+def ratio_of_numbers(x):
+    return x * (GAMMA / GAMMA) + (HALF / GAMMA - 1.0) * x
+
+
 def choice_by_a_number(x):
     y = x if GAMMA > 1.0 else -x
     if GAMMA:
@@ -652,6 +671,27 @@ def value_at(window: Window, i):
 def walk(begin, end, pair: Pair, out):
     for i in range(begin, end):
         out[i] = value_at(pair.left, i) + pair.weight * float_of(pair)
+
+
+@helper
+def step_of(i, window: Window):
+    return window.step + i
+
+
+@driver
+def makes_windows(begin, end, start, out):
+    for i in range(begin, end):
+        out[i] = value_at(Window(step=2.0, start=start), i) + step_of(i, Window(start, 0.5))
+
+
+@driver
+def makes_half_a_window(begin, end, start, out):
+    out[0] = value_at(Window(start=start), 0)
+
+
+@driver
+def makes_another_record(begin, end, start, out):
+    out[0] = value_at(Pair(left=start, weight=1.0), 0)
 
 
 @helper
@@ -674,7 +714,14 @@ def test_arithmetic_among_numbers_is_done_once_in_double():
     assert body_of(arithmetic_of_numbers, GAMMA=3.0) == ["return x * numbers_[0] + numbers_[1]"]
     emission = emit.Emission({"GAMMA": 3.0}, {})
     emission.add(arithmetic_of_numbers)
-    assert emission.numbers == {"(1.0 / GAMMA)": 1.0 / 3.0, "(((GAMMA - 1.0) * -GAMMA) / 2.0)": -3.0}
+    assert emission.numbers == {
+        "(1.0 / given['GAMMA'])": 1.0 / 3.0,
+        "(((given['GAMMA'] - 1.0) * -given['GAMMA']) / 2.0)": -3.0,
+    }
+
+
+def test_a_number_over_itself_is_one():
+    assert body_of(ratio_of_numbers, GAMMA=3.0) == ["return x + numbers_[0] * x"]
 
 
 def test_numbers_decide_at_run_time_but_for_zero():
@@ -692,6 +739,21 @@ def test_records_are_flattened_for_both_writers():
     other = np.zeros(3)
     HostKernel(kernel)(3, kernel.given((pair, other)))
     assert other.tolist() == out.tolist()
+
+
+def test_records_are_made_where_they_are_handed_on():
+    out, start = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    cpu.build([makes_windows], {}).makes_windows(0, 3, start, out)
+    assert out.tolist() == [2.5, 5.5, 8.5]
+
+
+@pytest.mark.parametrize(
+    ("function", "why"),
+    [(makes_half_a_window, "Window has the fields start, step"), (makes_another_record, "window is no Pair")],
+)
+def test_a_record_has_all_fields_and_the_class_of_its_parameter(function, why):
+    with pytest.raises(NotInSubset, match=why):
+        text_of(function)
 
 
 @driver
@@ -744,19 +806,16 @@ def test_a_law_may_come_from_a_table():
 
 
 def test_the_module_is_named_by_its_text():
-    texts = [text_of(weightless, {"N": n, "WEIGHTS": (1.0, 2.0)}) for n in (1, 1, 2)]
-    names = [emit.module_name(weightless, text) for text in texts]
-    assert names[0] == names[1] != names[2]
-    constants = {"N": 1, "WEIGHTS": (1.0, 2.0)}
-    assert emit.module_name(weightless, text_of(weightless, constants, real="float32")) != names[0]
-    other_runtime, _ = emit.numba_text(weightless, constants, {}, "float64", runtime.VERSION + "+")
-    assert emit.module_name(weightless, other_runtime) != names[0]
+    names = [Native(scaled, {"GAMMA": gamma}, {}, "float64").module.__name__ for gamma in (1.4, 1.4, 1.5, 0.0)]
+    assert names[0] == names[1] == names[2] != names[3]
+    assert Native(scaled, {"GAMMA": 1.4}, {}, "float32").module.__name__ != names[0]
 
 
 def test_the_text_names_the_source():
     text = text_of(material, {"GAMMA": 1.4})
-    for function, kind in ((material, "driver"), (scaled, "formula")):  # the first is what Python calls
-        assert f"# {__name__}.py, line {function.__code__.co_firstlineno}\n@{kind}\ndef {function.__name__}(" in text
+    for function in (material, scaled):
+        place = f"; {__name__}.py, line {function.__code__.co_firstlineno}\n"
+        assert f"{place}define internal double @{function.__name__}.0(" in text
 
 
 def test_two_scenes_live_side_by_side():
@@ -766,16 +825,42 @@ def test_two_scenes_live_side_by_side():
     assert values == [1.4, 1.5, 1.4]
 
 
+def test_a_text_made_before_is_found_without_folding(monkeypatch):
+    assert cpu.build([scaled], {"GAMMA": 1.25}).scaled(2.0) == 2.5
+    monkeypatch.setattr(Native, "_module_text", None)
+    assert cpu.build([scaled], {"GAMMA": 1.25, "N": 3}).scaled(2.0) == 2.5
+
+
+def test_the_fingerprint_tells_all_that_a_text_depends_on(monkeypatch):
+    first, second = Bound(material, {"GAMMA": 3.0}), Bound(scaled, {"GAMMA": 5.0})
+    bindings = {"first_material": first, "second_material": second}
+    before = fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float64")
+    other_number = bindings | {"first_material": Bound(material, {"GAMMA": 4.0})}
+    assert before == fingerprint(two_materials, {"GAMMA": 1.0}, other_number, "float64")
+    assert before == fingerprint(two_materials, {"GAMMA": 2.0, "N": 2}, bindings, "float64")  # neither is looked at
+    others = [
+        fingerprint(two_materials, {}, bindings | {"first_material": Bound(material, {"GAMMA": 0.0})}, "float64"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float32"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings | {"first_material": second}, "float64"),
+        fingerprint(two_materials, {"GAMMA": 1.0}, bindings | {"second_material": Bound(scaled)}, "float64"),
+    ]
+    monkeypatch.setitem(globals(), "scaled", cubed)  # which `material` calls
+    others.append(fingerprint(two_materials, {"GAMMA": 1.0}, bindings, "float64"))
+    plain_number = fingerprint(constants_are_folded, {}, {}, "float64")
+    monkeypatch.setitem(globals(), "HALF", 0.25)
+    assert len({before, *others}) == 1 + len(others)
+    assert fingerprint(constants_are_folded, {}, {}, "float64") != plain_number
+
+
 PROGRAM = """
 import sys
 import numpy as np
 from distfsi.device import cpu
+from distfsi.device.native import compilation
 from test_emit import exponentials_of
-kernel = cpu.build([exponentials_of], {}).exponentials_of
 B = np.zeros(1)
-kernel(np.zeros(1), B)
-statistics = kernel.dispatcher.stats
-print(B[0], sum(statistics.cache_hits.values()), sum(statistics.cache_misses.values()))
+cpu.build([exponentials_of], {}).exponentials_of(np.zeros(1), B)
+print(B[0], compilation.made)
 """
 
 
@@ -786,5 +871,5 @@ def test_a_second_process_finds_the_compiled_module(tmp_path, monkeypatch):
         subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120, check=True).stdout
         for _ in range(2)
     ]
-    assert [run.split() for run in runs] == [["1.0", "0", "1"], ["1.0", "1", "0"]]
+    assert [run.split() for run in runs] == [["1.0", "1"], ["1.0", "0"]]
     assert len(list(tmp_path.glob("exponentials_of_*.py"))) == 1

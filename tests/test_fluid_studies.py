@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.scatter import Point, draw_scatter

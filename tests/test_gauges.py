@@ -1,6 +1,7 @@
 """Gauges and the fields that cells remember, against exact answers; and the same files on any number of ranks."""
 
 from copy import deepcopy
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,14 +9,17 @@ import pytest
 
 from distfsi.coupling.kernels.cells import COVERED
 from distfsi.device.interface import DualArray
-from distfsi.diagnostics.peaks import schlieren
+from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.sampling import FluidSampler
+from distfsi.diagnostics.schlieren import schlieren
 from distfsi.errors import InputError
+from distfsi.gauges import Gauge, TableProbe, each_step
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.run import run
 from distfsi.scene import load
+from distfsi.scene.law_tables import table_of
 from distfsi.simulation import Simulation
 from distfsi.solid.fields import cauchy_stress
 from launch import ROOT, run_ranks
@@ -155,7 +159,7 @@ def test_a_marked_particle_is_followed(tubes):
     assert gauge["time [s]"][-1] == end
     assert gauge["position_y [m]"][-1] == columns["position"][row, 1]
     assert gauge["stress_zz [Pa]"][-1] == columns["stress"][row, 2]
-    assert gauge["density [kg/m3]"][-1] == columns["density"][row]
+    assert gauge["pressure [Pa]"][-1] == columns["pressure"][row]
     assert gauge["position_x [m]"][-1] < gauge["position_x [m]"][0]
 
 
@@ -310,6 +314,51 @@ def test_schlieren(box):
     assert not schlieren(fluid, None).any()
 
 
+@dataclass(frozen=True)
+class Speed(Gauge):
+    """A gauge of a kind that no other file knows: the largest speed at two points so far."""
+
+    every: float | None = each_step()
+
+    def probe(self, run):
+        return SpeedProbe(run)
+
+
+class SpeedProbe(TableProbe):
+    def __init__(self, run):
+        self.columns, self._points, self._largest = ["speed [m/s]"], run.fluid_points(np.array([[0.2], [0.6]])), 0.0
+
+    def rows(self, run):
+        self._largest = max(self._largest, np.abs(self._points.values()[:, 2]).max())
+        return np.array([[self._largest]])
+
+    def kept(self):
+        return {"largest": np.array(self._largest)}
+
+    def bring_back(self, kept):
+        self._largest = float(kept["largest"])
+
+
+def test_a_gauge_of_a_new_kind_is_one_file(tmp_path):
+    """Its table of the input, its file, its times and its restart follow from it."""
+    table = table_of(Speed, "kind", "speed")
+    assert table(kind="speed", every="1 ms").build() == Speed(1e-3)
+    simulation = Simulation.of(load(SOD, [f"output.directory={tmp_path}"]), Communicator(), 1)
+    recorder = GaugeRecorder("fast", Speed(0.02), simulation)
+    simulation.watchers.append(recorder)
+    simulation.watch()
+    while simulation.time < 0.07:
+        simulation.step()
+    kept = deepcopy(recorder.snapshot())
+    while simulation.time < 0.13:
+        simulation.step()
+    assert len(read_history(tmp_path / "gauges/fast.csv")["time [s]"]) == 7
+    again = GaugeRecorder("fast", Speed(0.02), simulation)
+    again.restore(kept)
+    rows = read_history(tmp_path / "gauges/fast.csv")
+    assert len(rows["time [s]"]) == 4 and rows["speed [m/s]"][-1] == kept["values"]["largest"] > 0.5
+
+
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
 def test_stress_of_particles(dimensions):
     """Pressure and deviator put together: the trace is -3 p, and the shear stresses stand where VTK looks for them."""
@@ -331,7 +380,7 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='plane', axis='x', position=0}"], "gauges.a.axis (--set): 'x' in a domain of 1 dimension(s)"),
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
         (["gauges.a={kind='pont', position=0}"],
-         "gauges.a.kind (--set): \"pont\"; expected one of 'point', 'line', 'plane', 'particle', 'body'; "
+         "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
          "did you mean 'point'?"),
         (["gauges.a={kind='point', position=0.5, evry=1}"],
          "gauges.a.evry (--set): unknown key; expected one of 'kind', 'position', 'every'; did you mean 'every'?"),

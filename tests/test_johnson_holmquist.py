@@ -1,7 +1,7 @@
 """The strength model of Johnson and Holmquist for glass and ceramics, against an independent integration."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -38,9 +38,9 @@ def test_yield_stresses_by_hand():
 
 def test_no_more_tension_than_is_left():
     limited = plain(JohnsonHolmquist.limited_tension, {"FAILS": False})
-    fields = [getattr(GLASS, name) for name in GLASS.__dataclass_fields__]
+    values = [getattr(GLASS, field.name) for field in fields(GLASS)]
     for pressure, damage, left in ((-1e9, 0.0, -0.15e9), (-1e9, 0.5, -0.075e9), (-1e9, 1.0, 0.0), (1e9, 1.0, 1e9)):
-        assert limited(*fields, pressure, damage) == left
+        assert limited(*values, pressure, damage) == left
 
 
 @pytest.mark.parametrize("bulking", [0.0, 1.0])

@@ -4,9 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.mesh.communicator import Communicator
+from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.study import kernels
 from launch import ROOT
@@ -42,7 +42,7 @@ def test_solid_and_coupling_compile():
     """A plate between gases; all kernels are compiled once and kept."""
     texts = texts_of(load(ROOT / "inputs/thin_plate.toml"))
     names = {of.kernel.name for text, of in texts.items() if nvrtc.cubin(of.kernel.name, text, "sm_90")}
-    assert {"find_band", "advance_band", "deform", "accelerate", "crack", "cut", "press", "pack_rows"} <= names
+    assert {"find_band", "advance_band", "deform", "accelerate_bonds", "mark_exposed", "pack_rows"} <= names
 
 
 @pytest.mark.full

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage, imread
 from PIL import Image
 
-from distfsi.__main__ import main
+from distfsi.commands.line import main
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import fields, frames
@@ -214,7 +214,7 @@ def test_large_layers_are_thinned_out(space, monkeypatch):
 def test_particles_of_a_slice_lie_near_it(space):
     film = Film(space, (1, 0.3))
     assert film.cell_fields == ["density", "pressure", "velocity"]
-    assert "density" in film.particle_fields
+    assert "von_mises" in film.particle_fields
     (frame,) = film.frames([0])
     assert frame.axes == (0, 2)
     assert 0 < len(frame.particles["position"]) < 4 * 8 * 8
@@ -263,7 +263,7 @@ def test_info_tells_what_a_folder_holds(space, capsys):
 def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
     scene = load(ROOT / "inputs" / "sod.toml")
     try:
-        with Journal(tmp_path, scene, Communicator(), 3):
+        with Journal(tmp_path, scene, Communicator(), 3, {"stage": 3.0004, "output": 1.0}):
             assert read_journal(tmp_path)["status"] == "running"
             assert "still running" in describe(tmp_path)
             if error:
@@ -273,5 +273,7 @@ def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
     notes = json.loads((tmp_path / "run.json").read_text())
     assert (notes["status"], notes["title"], notes["threads per rank"]) == (status, scene.title, 3)
     assert told in describe(tmp_path)
+    assert notes["seconds by part"] == {"stage": 3.0, "output": 1.0}
+    assert "time in    stage 75 %, output 25 %" in describe(tmp_path)
     if error:
         assert f"because    {notes['message'].splitlines()[0]}" in describe(tmp_path)

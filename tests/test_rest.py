@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from distfsi.device.markers import helper
-from distfsi.fluid.kernels import stage as kernels
+from distfsi.fluid.kernels import tile as kernels
 from launch import ROOT
 from mpi_rest import SCENES, cells_of, digest, follow, simulation_of
 
@@ -66,7 +66,7 @@ def stirred(name):
     fluid.restore(fluid.snapshot() | {"cells": {"state": start}})
     for _ in range(6):
         simulation.step()
-    return written, cells_of(simulation), calm[fluid.tiles[:, kernels.BLOCK] == last]
+    return written, cells_of(simulation), calm[fluid.tiling.block == last]
 
 
 def test_what_is_written_from_outside_wakes(monkeypatch):
@@ -85,7 +85,7 @@ def test_blocks_with_covered_cells_are_looked_at():
         simulation.step()
     fluid, blocks = simulation.fluid, simulation.blocks
     covered = [fluid.active(simulation.coupling.covered, block).any() for block in range(blocks.local_count)]
-    near_solid = np.array(covered)[fluid.tiles[:, kernels.BLOCK]]
+    near_solid = np.array(covered)[fluid.tiling.block]
     assert near_solid.any()
     assert fluid.rest.calm.any()
     assert not fluid.rest.calm[near_solid].any()

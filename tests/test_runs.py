@@ -93,14 +93,14 @@ FULL_TUBE = ("domain.cells=[64,64]", 'solid.bodies.tube.spacing="1.2 mm"', 'time
 
 @pytest.mark.parametrize("riemann", ["hllc", "adaptive"])
 def test_momentum_of_a_tube_with_its_charge_off_centre(tmp_path, riemann):
-    """Full tube: momentum of fluid + solid + ledger constant to 1e-12 of the sum of its absolute values."""
+    """Full tube: momentum of fluid + solid - coupling constant to 1e-12 of the sum of its absolute values."""
     directory = run_input("steel_tube_full.toml", tmp_path, *FULL_TUBE, f"fluid.riemann={riemann}")
     history = read_history(directory / "history.csv")
     for name in ("momentum_x", "momentum_y"):
         assert np.abs(history[f"drift {name}"]).max() < 1e-12
         assert np.abs(history[f"solid {name} [N s]"]).max() > 0.0
     assert np.abs(history["drift energy"]).max() < 1e-12
-    made = sum(history[name][-1] for name in history if name.startswith("ledger") and "energy" in name)
+    made = sum(history[name][-1] for name in history if name.startswith("coupling") and "energy" in name)
     assert abs(made) < 0.05 * history["fluid energy [J]"][0]
 
 

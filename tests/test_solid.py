@@ -9,6 +9,7 @@ import pytest
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.laws.solid.strength.none import NoStrength
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from distfsi.study.stability_solid import pieces
 from launch import run_ranks
@@ -63,7 +64,7 @@ def test_a_free_collision_conserves_mass_momentum_and_energy(dimensions, spacing
 def test_impulses_clamps_planes_and_gravity_close_the_balances():
     clamp = HalfSpace((-0.8, 0.0), (1.0, 0.0))
     beam = body(Box((-1.0, 0.0), (0.5, 0.3)), 0.05, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
-    part = solid([beam], (-1.0, 0.0), (1.0, 1.0), symmetric=(1,), gravity=(300.0, -500.0))
+    part = solid([beam], (-1.0, 0.0), (1.0, 1.0), symmetric=(1,), sources=(Gravity((300.0, -500.0)),))
     given, work = np.zeros(2), 0.0
 
     def impulse(c):

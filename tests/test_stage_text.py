@@ -1,4 +1,4 @@
-"""The fluid's stage in CUDA C, on the host: the bits of numba for every kind of flow, and each barrier is needed."""
+"""The fluid's stage in CUDA C, on the host: the bits of the CPU for every kind of flow, and each barrier is needed."""
 
 import re
 
@@ -104,7 +104,7 @@ def calls():
 
 
 def count_unlike(kernel, end, before, after):
-    """Values that come out otherwise than numba's, in either order of the threads."""
+    """Values that come out otherwise than the CPU's, in either order of the threads."""
     unlike = 0
     for reverse in (False, True):
         copies = copies_of(before)

@@ -1,29 +1,33 @@
 """Every row pass of the fluid must come out as packed arithmetic: read from the machine code, not from a clock."""
 
-import inspect
 import platform
 import re
-import runpy
+import sys
 
 import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 from numba import typeof
 
-from distfsi.coupling.cut_cells.kernels import forces as cut_forces
-from distfsi.coupling.cut_cells.kernels import wall_distance
-from distfsi.coupling.kernels import spreading as push
-from distfsi.device import emit, runtime
+from distfsi.coupling.cut_cells.kernels import forces, nodal_distance
+from distfsi.coupling.kernels import spreading
+from distfsi.device import llvm_text
+from distfsi.device.fold import parameters_of
+from distfsi.device.native import Native
 from distfsi.diagnostics.kernels import peaks
-from distfsi.fluid.kernels import stage as fluid
+from distfsi.fluid.kernels import rows as fluid
+from distfsi.fluid.kernels.records import StageStep
+from distfsi.fluid.kernels.signals import signal_row
 from fluids import model_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="reads the instructions of x86-64 only"
 )
 
-ROWS = (fluid.primitives_row, fluid.rises_row, fluid.flux_row, fluid.update_row, fluid.signal_row, peaks.peaks_row)
-REALS = ("cx", "cy", "cz", "rate", "b", "dt", "rx", "ry", "rz", "ambient", "threshold", "time")
+ROWS = (fluid.primitives_row, fluid.increments_row, fluid.flux_row, fluid.update_row, signal_row, peaks.peaks_row)
+REALS = {"rx", "ry", "rz", "ambient", "threshold", "time", "dt", "faces_rate"} | {
+    f"step_{name}" for name in StageStep._fields
+}
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),
@@ -39,27 +43,32 @@ METHOD = {
 WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
 
-def module_text(row, scene):
+@pytest.fixture(autouse=True)
+def _nothing_compiled_before(tmp_path, monkeypatch):
+    """What is found on disk cannot be looked at."""
+    monkeypatch.setenv("DISTFSI_CACHE", str(tmp_path))
+
+
+def native_row(row, scene):
+    """A row for a scene, as if it were a driver, and arguments: arrays (upper-case names), reals and integers."""
     names, dimensions, real = SCENES[scene]
     model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
-    return emit.numba_text(row, model.constants, model.bindings, real, runtime.VERSION)
-
-
-def machine_code(row, text, numbers, real):
-    """What the module's row becomes for arrays (upper-case names), reals and integers."""
-    module = {}
-    exec(text, module)
     arguments = [
         np.zeros(1, np.uint8 if name == "K" else real)
-        if name.isupper() or name.startswith("U_")
+        if name.isupper() or name.startswith(("U_", "states_"))
         else np.dtype(real).type(0)
         if name in REALS
         else 0
-        for name in inspect.signature(row).parameters
+        for name in parameters_of(row, 0)
     ]
-    arguments += map(np.dtype(real).type, numbers)
-    module[row.__name__].compile(tuple(map(typeof, arguments)))
-    return "\n".join(module[row.__name__].inspect_asm().values())
+    return Native(row, model.constants, model.bindings, real), arguments
+
+
+def machine_code(native, arguments):
+    """What numba makes of a driver for such arguments."""
+    numbers = native.numbers()
+    native.dispatcher.compile(tuple(map(typeof, [*arguments, *numbers])))
+    return "\n".join(native.dispatcher.inspect_asm().values())
 
 
 def count(code, operations, kind, registers):
@@ -74,9 +83,9 @@ def test_rows_are_packed(row, scene):
     """Each loop has a packed body without any scalar arithmetic; scalar is only the remainder."""
     names, dimensions, real = SCENES[scene]
     own, other = ("d", "s") if real == "float64" else ("s", "d")
-    code = machine_code(row, *module_text(row, scene), real)
+    code = machine_code(*native_row(row, scene))
     bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
-    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.rises_row else 1
+    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.increments_row else 1
     assert len(bodies) >= loops
     assert sum(count(body, "mul|div|sqrt", "s" + own, ["xmm"]) for body in bodies) == 0
     for operation in ("mul", "div", "sqrt"):
@@ -86,53 +95,41 @@ def test_rows_are_packed(row, scene):
 
 
 @pytest.mark.parametrize("row", [fluid.flux_row, fluid.update_row], ids=lambda row: row.__name__)
-def test_without_the_promise_of_no_alias_rows_are_scalar(row):
-    """So that the test above does fail on the day the compile option is no longer heard."""
-    text, numbers = module_text(row, "water-air-2D")
-    plain_row = "from numba import njit\nrow = njit(error_model='numpy')\n"
-    code = machine_code(
-        row, text.replace("real = np.float64\n", "real = np.float64\n" + plain_row, 1), numbers, "float64"
-    )
+def test_without_the_promise_of_no_alias_rows_are_scalar(row, monkeypatch, tmp_path):
+    """So that the test above does fail on the day the promise is no longer heard."""
+    monkeypatch.setenv("DISTFSI_CACHE", str(tmp_path))
+    text = llvm_text.Module.text
+    monkeypatch.setattr(llvm_text.Module, "text", lambda self: text(self).replace("ptr noalias", "ptr"))
+    native, arguments = native_row(row, "water-air-2D")
+    sys.modules.pop(native.module.__name__)
+    code = machine_code(Native(row, native.constants, native.bindings, native.real), arguments)
     assert count(code, "mul", "sd", ["xmm"]) > 10
     assert count(code, "mul", "pd", WIDE) == 0
 
 
-POINTS = (wall_distance.add_balls, cut_forces.see_particles, push.gather_kicks)
-INTEGERS = (
-    "order",
-    "start",
-    "low",
-    "window",
-    "strides",
-    "chosen",
-    "band",
-    "walled",
-    "shape",
-    "cells",
-    "home",
-    "grid_cells",
-)
-PAIRS = ("seen_cells", "origin", "extent")  # of integers
-TABLES = ("position", "ball", "mean", "image", "gained")
+POINTS = (nodal_distance.add_spheres, forces.interpolate, spreading.spread)
+INTEGERS = ("order", "start", "low", "window", "strides", "chosen", "band", "walled", "home")
+INTEGERS += ("shape", "steps", "cells", "origin", "extent", "seen")
+TABLES = ("position", "values", "mean", "image", "gained", "origin", "extent", "seen")
 COUNTS, AMOUNTS = ("begin", "end", "width", "giver"), ("size", "radius", "largest", "reach")
 
 
 def example(name):
-    """An argument of the type that a driver has under this name."""
-    if name in COUNTS or name in AMOUNTS:
-        return 0 if name in COUNTS else 1.0
+    """An argument of the type that a driver has under this name; fields of records by their last word."""
+    if name in COUNTS:
+        return 0
+    *_, word = name.split("_")
+    if word in AMOUNTS:
+        return 1.0
     if name == "kind":
         return np.zeros(1, np.int8)
-    dimensions = 5 if name == "kick" else 2 if name in TABLES + PAIRS else 1
-    return np.zeros((1,) * dimensions, np.int64 if name in INTEGERS + PAIRS else float)
+    dimensions = 5 if name == "field" else 2 if word in TABLES else 1
+    return np.zeros((1,) * dimensions, np.int64 if word in INTEGERS else float)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("driver", POINTS, ids=lambda driver: driver.__name__)
-def test_points_near_each_other_are_packed(driver, tmp_path):
+def test_points_near_each_other_are_packed(driver):
     """What a particle is to LANES points is computed at once: in the driver, where its rows know how many there are."""
-    text, _ = emit.numba_text(driver, {"DIMENSIONS": 3, "LANES": 8, "KICKS": 4}, {}, "float64", runtime.VERSION)
-    (tmp_path / "kernel.py").write_text(text)
-    function = runpy.run_path(str(tmp_path / "kernel.py"))[driver.__name__]
-    function(*map(example, inspect.signature(driver).parameters))
-    assert count("\n".join(function.inspect_asm().values()), "mul", "pd", WIDE) >= 5
+    native = Native(driver, {"DIMENSIONS": 3, "LANES": 8, "GHOSTS": 2, "TRANSFERRED": 4}, {}, "float64")
+    assert count(machine_code(native, [*map(example, parameters_of(driver, 0))]), "mul", "pd", WIDE) >= 5

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.laws.law import FluidEos
+from distfsi.laws.law import FluidEos, Source
 from distfsi.scene.description import Box, Domain, Fluid, FluidState, Output, Performance, Phase, Region, Scene, Time
 from distfsi.simulation import Simulation
 from distfsi.study.exact import PureState, RiemannSolution, exact_riemann
@@ -32,6 +32,7 @@ def scene_of(
     cfl: float = 0.5,
     scheme: str = "rk3",
     performance: Performance | None = None,
+    sources: tuple[Source, ...] = (),
     **method: object,
 ) -> Scene:
     """A scene of one or two materials; `method`: what differs from minmod and HLLC in float64."""
@@ -45,11 +46,11 @@ def scene_of(
         title="",
         domain=Domain(lower, upper, cells, boundaries or (OPEN,) * dimensions),
         time=Time(end, cfl, None, scheme=scheme),
-        gravity=(0.0,) * dimensions,
         fluid=fluid,
         solid=None,
         output=Output("", 0.0, 10),
         performance=performance or Performance(BLOCKS[dimensions], BLOCKS[dimensions]),
+        sources=sources,
     )
 
 

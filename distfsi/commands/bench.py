@@ -1,247 +1,34 @@
-"""Speed of this machine on standard work, as JSON: whole time loops without output, best of several runs.
+"""Measure the speed of this machine, as JSON.
 
-cell_stages_per_second counts one Runge-Kutta stage of one cell; `share_of_kernel` is the loop's speed over that of its
-bare stage kernel, timed in the same run. A complete bench is kept for `python -m distfsi check`.
+Standard flows and solids, each the best of several runs; a few minutes on an idle machine. The result is kept, and
+`distfsi check` then estimates times. `bench ranks` measures what MPI ranks cost instead: messages, waiting, uneven
+shares.
+
+examples:
+  distfsi bench
+  distfsi bench --only shock_bubble --threads 1
+  mpiexec -n 4 distfsi bench ranks
 """
 
 from __future__ import annotations
 
-import gc
-import json
-import os
-import platform
-import sys
-import time as clock
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+import argparse
 
-import numpy as np
-
-from distfsi import __version__
-from distfsi.commands.works import COUPLED, FLUIDS, SIZES, SMALLEST, SOLID_SIZES, SOLIDS
-from distfsi.device.cpu import cache_directory
-from distfsi.diagnostics.budget import Budget
-from distfsi.fluid.fluid import Fluid
-from distfsi.mesh.communicator import Communicator
-from distfsi.scene.description import Scene
-from distfsi.simulation import Simulation, threads_of_rank
-
-REPEATS = 5
-RIPPLE = 1e-4  # relative
-SHEAR_RATE = 10.0  # 1/s
-CALLS_OF_COUPLING = ("time_step", "update_geometry", "before_stage", "after_stage", "transfer_impulse", "account_work")
-
-Result = dict[str, float]
+from distfsi.commands.ranks import start_ranks
 
 
-def start(work: Scene, communicator: Communicator, threads: int | None) -> Simulation:
-    """The work before its first step, with waves everywhere, so that no part of a fluid is at rest, and bodies sheared
-    where there are two dimensions, so that they yield."""
-    simulation = Simulation.of(work, communicator, threads)
-    if simulation.fluid:
-        state, conserved = simulation.fluid.state, simulation.fluid.model.conserved
-        ripple = 1.0 + RIPPLE * np.cos(np.arange(np.prod(state.shape[2:]))).reshape(state.shape[2:])
-        state[:, :conserved] *= ripple.astype(state.dtype)
-    if simulation.solid and work.domain.dimensions > 1:
-        particles = simulation.solid.columns
-        particles["velocity"][:, 0] += SHEAR_RATE * particles["position"][:, -1]
-    return simulation
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what the command takes."""
+    parser.add_argument("what", nargs="?", choices=("ranks",), help="ranks: messages, waiting and uneven shares")
+    parser.add_argument("--threads", type=int, help="threads per rank")
+    parser.add_argument("--only", metavar="TEXT", help="only benchmarks whose name contains TEXT")
 
 
-def time_loop(simulation: Simulation, seconds: float) -> tuple[float, float]:
-    """(first step [s], best time per step [s]) of a run that has just been built."""
-    communicator = simulation.communicator
-    communicator.barrier()
-    started = clock.perf_counter()
-    simulation.step()
-    communicator.barrier()
-    first = clock.perf_counter() - started
-    started = clock.perf_counter()
-    simulation.step()
-    steps = communicator.broadcast(max(2, int(seconds / (clock.perf_counter() - started))))
-    best = np.inf
-    for _ in range(REPEATS):
-        communicator.barrier()
-        started = clock.perf_counter()
-        for _ in range(steps):
-            simulation.step()
-        communicator.barrier()
-        best = min(best, (clock.perf_counter() - started) / steps)
-    return first, best
+def execute(arguments: argparse.Namespace) -> None:
+    """Measure, and print JSON."""
+    from distfsi.resources import bench, bench_ranks
 
-
-def time_history(simulation: Simulation) -> float:
-    """Best time [s] of one row of the history."""
-    budget, best = Budget(simulation.fluid, simulation.solid, simulation.coupling), np.inf
-    for _ in range(REPEATS):
-        started = clock.perf_counter()
-        budget.row(simulation)
-        best = min(best, clock.perf_counter() - started)
-    return best
-
-
-def time_kernel(simulation: Simulation) -> float:
-    """Best time [s] of one bare stage kernel on this rank's tiles."""
-    fluid, best = simulation.fluid, np.inf
-    tiles = np.arange(len(fluid.tiles))
-    for _ in range(REPEATS * 3):
-        simulation.communicator.barrier()
-        started = clock.perf_counter()
-        fluid.advance_tiles(tiles, fluid.stages[1], 0.1 * simulation.dt)
-        simulation.communicator.barrier()
-        best = min(best, clock.perf_counter() - started)
-    return best
-
-
-def stir(fluid: Fluid) -> None:
-    """Make all cells differ a little, so that no tile is at rest."""
-    cells = fluid.blocks.without_ghosts(fluid.state)
-    noise = np.random.default_rng(0).standard_normal((len(cells), 1, *cells.shape[2:]))
-    cells[:, : fluid.model.conserved] *= (1.0 + 1e-6 * noise).astype(cells.dtype)
-
-
-@dataclass
-class Stopwatch:
-    """Calls a function and adds up the time it takes [s]."""
-
-    function: Callable
-    seconds: float = 0.0
-
-    def __call__(self, *arguments):
-        started = clock.perf_counter()
-        result = self.function(*arguments)
-        self.seconds += clock.perf_counter() - started
-        return result
-
-
-def time_coupled_step(simulation: Simulation) -> tuple[float, float]:
-    """(wall, step) [s]: what all calls of the coupling take of the next step, and the step itself, on this rank."""
-    coupling = simulation.coupling
-    watches = {name: Stopwatch(getattr(coupling, name)) for name in CALLS_OF_COUPLING}
-    for name, watch in watches.items():
-        setattr(coupling, name, watch)
-    whole = Stopwatch(simulation.step)
-    whole()
-    for name in watches:
-        delattr(coupling, name)
-    return sum(watch.seconds for watch in watches.values()), whole.seconds
-
-
-def time_parts(simulation: Simulation) -> Result:
-    """What the wall takes of a step of fluid and solid together, and of one of both alone; and how many cells are
-    around it. Of the fastest step of several."""
-    gather = simulation.communicator.allgather
-    wall, step = min((time_coupled_step(simulation) for _ in range(REPEATS)), key=lambda times: times[1])
-    cells, band = int(np.prod(simulation.scene.domain.cells)), int(simulation.coupling.workload().sum())
-    return {
-        "cells": cells,
-        "band_cells": sum(gather(band)),
-        "share_of_band": sum(gather(band)) / cells,
-        "wall_seconds_per_step": max(gather(wall)),
-        "wall_beside_both_alone": max(gather(wall / (step - wall))),
-    }
-
-
-def bench_fluid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
-    """Speed of the time loop of one fluid, none of it at rest."""
-    simulation = start(work, communicator, threads)
-    stir(simulation.fluid)
-    first, step = time_loop(simulation, seconds)
-    cells = int(np.prod(work.domain.cells))
-    kernel = time_kernel(simulation)
-    memory = communicator.allgather(simulation.fluid.memory())
-    return {
-        "cells": cells,
-        "cell_stages_per_second": len(simulation.fluid.stages) * cells / step,
-        "kernel_cell_stages_per_second": cells / kernel,
-        "share_of_kernel": len(simulation.fluid.stages) * kernel / step,
-        "history_row_seconds": time_history(simulation),
-        "bytes_per_cell": sum(memory) / cells,
-        "first_step_seconds": first,
-    }
-
-
-def bench_solid(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
-    """Speed of the time loop of one solid, with a fluid around it or without; and what the wall between them costs."""
-    simulation = start(work, communicator, threads)
-    particles = sum(communicator.allgather(len(simulation.solid.columns["id"])))
-    first, step = time_loop(simulation, seconds)
-    if simulation.coupling:
-        stir(simulation.fluid)
-    coupled = time_parts(simulation) if simulation.coupling else {}
-    return coupled | {
-        "particles": particles,
-        "particle_steps_per_second": particles / step,
-        "first_step_seconds": first,
-    }
-
-
-def bench_smallest(work: Scene, communicator: Communicator, threads: int | None, seconds: float) -> Result:
-    """What does not depend on the size of a run: time to start it with kernels compiled before, and time per step."""
-    start(work, communicator, threads).step()
-    _forget_kernels()
-    started = clock.perf_counter()
-    simulation = start(work, communicator, threads)
-    simulation.step()
-    communicator.barrier()
-    seconds_to_start = clock.perf_counter() - started
-    return {
-        "start_seconds": seconds_to_start,
-        "seconds_per_step": time_loop(simulation, seconds)[1],
-        "history_row_seconds": time_history(simulation),
-    }
-
-
-def _forget_kernels() -> None:
-    """The next build loads the compiled kernels from disk again."""
-    for name in [name for name in sys.modules if name.startswith("distfsi_kernels.")]:
-        del sys.modules[name]
-    gc.collect()
-
-
-def main(communicator: Communicator, threads: int | None, only: str | None = None, seconds: float = 0.5) -> dict:
-    """Run the benchmarks (those whose name holds `only`), print them as JSON on rank 0, and keep a complete bench.
-
-    SOLID_SIZES are for those who ask for them: they take much memory.
-    """
-    result = {
-        "distfsi": __version__,
-        "machine": platform.processor() or platform.machine(),
-        "ranks": communicator.size,
-        "threads_per_rank": threads or threads_of_rank(communicator),
-    }
-    works: tuple[tuple[Mapping[str, Callable[[], Scene]], Callable[..., Result]], ...] = (
-        ({f"smallest_{name}": work for name, work in SMALLEST.items()}, bench_smallest),
-        (FLUIDS | SIZES, bench_fluid),
-        (SOLIDS | COUPLED | (SOLID_SIZES if only else {}), bench_solid),
-    )
-    for named, measure in works:
-        for name, work in named.items():
-            if only is None or only in name:
-                result[name] = measure(work(), communicator, threads, seconds)
-    if communicator.rank == 0:
-        print(json.dumps(result, indent=2), flush=True)
-        if only is None:
-            _keep(result)
-    return result
-
-
-def kept_bench() -> dict | None:
-    """The last complete bench of this machine by this version, if there is one."""
-    try:
-        result = json.loads(_place().read_text())
-    except (OSError, ValueError):
-        return None
-    return result if result.get("distfsi") == __version__ else None
-
-
-def _keep(result: dict) -> None:
-    _place().parent.mkdir(parents=True, exist_ok=True)
-    temporary = _place().with_suffix(".tmp")
-    temporary.write_text(json.dumps(result))
-    os.replace(temporary, _place())
-
-
-def _place() -> Path:
-    return cache_directory() / f"bench-{platform.node()}.json"
+    if arguments.what == "ranks":
+        bench_ranks.main(start_ranks(), arguments.threads)
+    else:
+        bench.main(start_ranks(), arguments.threads, arguments.only)

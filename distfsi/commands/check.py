@@ -1,84 +1,39 @@
-"""What a run will cost and what it could do without, told before it starts: `python -m distfsi check`."""
+"""Check a scene and estimate what its run will cost.
+
+All faults of the input are listed at once, with their lines. For a sound input: cells, particles, memory, bytes of
+output, time steps, and advice on what the scene pays for without using it. `distfsi bench` measures this machine once;
+then `check` estimates the time, too.
+
+examples:
+  distfsi check scene.toml
+  distfsi check scene.toml --ranks 8 --threads 4
+  distfsi check scene.toml --set domain.cells=[400,400]
+"""
 
 from __future__ import annotations
 
-from distfsi.commands.resources import Resources
-from distfsi.output.progress import format_duration
-from distfsi.output.scales import format_bytes
-from distfsi.scene.advice import advice, thickness
-from distfsi.scene.description import Body, Scene
+import argparse
+import os
+
+from distfsi.commands.words import add_overrides, positive
 
 
-def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: dict | None = None) -> str:
-    """Sizes, memory, output, steps and time of `scene` on so many ranks, and advice, as text.
-
-    `bench`: what `bench.kept_bench` gives, for the time.
-    """
-    domain, resources = scene.domain, Resources(scene, ranks)
-    size = " x ".join(f"{b - a:.6g}" for a, b in zip(domain.lower, domain.upper, strict=True))
-    lines = [
-        scene.title,
-        _line("domain", f"{size} m, {' x '.join(map(str, domain.cells))} cells of {_metres(domain.spacing)}"),
-        _line("blocks", _blocks(resources)),
-    ]
-    if scene.fluid:
-        names = " and ".join(phase.name for phase in scene.fluid.phases)
-        lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
-    for body in scene.solid.bodies if scene.solid else ():
-        lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
-    lines += [
-        _line("memory", _memory(resources)),
-        _line("output", _output(resources)),
-        _line("steps", f"about {resources.steps:,}, if no wave becomes faster than the first ones"),
-        _line("time", _time(resources, threads, bench)),
-    ]
-    return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what the command takes."""
+    parser.add_argument("input", help="the scene, a TOML file")
+    add_overrides(parser)
+    parser.add_argument("--ranks", type=positive, default=1, help="MPI ranks of the run (default: 1)")
+    parser.add_argument("--threads", type=positive, help="threads per rank (default: cores of this machine / ranks)")
 
 
-def _line(name: str, text: str) -> str:
-    return f"  {name:<11}{text}"
+def execute(arguments: argparse.Namespace) -> None:
+    """Print the report."""
+    from distfsi.scene import load
 
+    scene = load(arguments.input, arguments.set)
 
-def _blocks(resources: Resources) -> str:
-    blocks = resources.blocks[0]
-    shape = " x ".join(map(str, blocks.block_cells[: resources.dimensions]))
-    text = f"{blocks.count} of {shape} cells"
-    if resources.ranks == 1:
-        return text
-    counts = [b.local_count for b in resources.blocks]
-    text += f"; {min(counts)} to {max(counts)} on each of {resources.ranks} ranks"
-    idle = counts.count(0)
-    return text + (f"; {idle} have none: smaller blocks or fewer ranks" if idle else "")
+    from distfsi.resources.bench import kept_bench
+    from distfsi.resources.report import report
 
-
-def _body(body: Body, particles: int, scene: Scene) -> str:
-    text = f"{body.name}: {particles:,} particles {_metres((body.spacing,))} apart"
-    thick = thickness(body, scene.domain)
-    if thick is None:
-        return text
-    text += f", {thick:.4g} m thick: {thick / body.spacing:.3g} particles"
-    return text + (f", {thick / min(scene.domain.spacing):.3g} cells" if scene.fluid else "")
-
-
-def _memory(resources: Resources) -> str:
-    arrays = format_bytes(resources.arrays())
-    return f"about {format_bytes(resources.memory())} per rank, {arrays} of it for cells and particles; none of a GPU"
-
-
-def _output(resources: Resources) -> str:
-    times, each = resources.output_times(), resources.output_bytes()
-    total = f"{format_bytes(times * each)} in all, in {resources.scene.output.directory}"
-    return f"{times} field outputs of about {format_bytes(each)}, {total}"
-
-
-def _time(resources: Resources, threads: int, bench: dict | None) -> str:
-    if bench is None:
-        return "unknown: `python -m distfsi bench` measures this machine once for all"
-    seconds = resources.seconds(threads, bench)
-    place = f"{resources.ranks} rank(s) of {threads} thread(s), by the bench of this machine"
-    return f"about {format_duration(max(seconds, 1.0))} on {place}; compiling, the first time, comes on top"
-
-
-def _metres(lengths: tuple[float, ...]) -> str:
-    distinct = lengths if len({f"{h:.6g}" for h in lengths}) > 1 else lengths[:1]
-    return " x ".join(f"{h:.6g}" for h in distinct) + " m"
+    threads = arguments.threads or max(1, len(os.sched_getaffinity(0)) // arguments.ranks)
+    print(report(scene, arguments.ranks, threads, kept_bench()))

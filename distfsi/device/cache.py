@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,3 +33,8 @@ def locked(path: Path) -> Iterator[None]:
     with open(path.with_suffix(".lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
+
+
+def file_name(name: str, text: str) -> str:
+    """The name under which what is compiled from a text is kept."""
+    return f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"

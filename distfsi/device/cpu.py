@@ -1,23 +1,20 @@
-"""The CPU as a device: compile emitted modules with numba, keep them on disk, run drivers on a team of threads."""
+"""The CPU as a device: drivers in machine code (device/native.py), run on a team of threads."""
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 import threading
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from copy import copy
-from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 
-from distfsi.device import emit, runtime
-from distfsi.device.cache import cache_directory, locked, write_whole
-from distfsi.device.fold import Bound, NotInSubset, flat_values
+from distfsi.device.cache import cache_directory
+from distfsi.device.fold import Bound, NotInSubset
+from distfsi.device.native import Native
 
 __all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
 
@@ -25,57 +22,16 @@ __all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
 def build(
     drivers: Iterable[Callable],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound] | None = None,
+    bindings: Mapping[str, Bound | type] | None = None,
     real: str = "float64",
 ) -> SimpleNamespace:
-    """Compile each driver, specialised for a scene, as a module of its own.
+    """Each driver, specialised for a scene.
 
     `constants` are the names a scene fixes, `bindings` the formulas it chooses for a name. Returns a namespace with the
-    drivers under their own names; compilation happens at a driver's first call and is kept on disk. Raises NotInSubset.
+    drivers under their own names; compilation happens at a driver's first call and is kept on disk. That call raises
+    NotInSubset for what cannot be compiled.
     """
-    compiled = {}
-    for driver in drivers:
-        text, numbers = emit.numba_text(driver, constants, bindings or {}, real, runtime.VERSION)
-        module = _load(emit.module_name(driver, text), text)
-        numbers = tuple(map(np.dtype(real).type, numbers))
-        compiled[driver.__name__] = _Compiled(getattr(module, driver.__name__), Path(module.__file__), numbers)
-    return SimpleNamespace(**compiled)
-
-
-def _load(name: str, text: str) -> ModuleType:
-    full_name = f"distfsi_kernels.{name}"
-    if full_name in sys.modules:
-        return sys.modules[full_name]
-    path = cache_directory() / f"{name}.py"
-    if not path.exists():
-        write_whole(path, text.encode())
-    spec = importlib.util.spec_from_file_location(full_name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[full_name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-class _Compiled:
-    """A driver and the `numbers` of a scene. It compiles at its first call, in one process of a machine at a time:
-    others then find it on disk."""
-
-    def __init__(self, dispatcher: Callable, path: Path, numbers: tuple[np.floating, ...]):
-        self.dispatcher, self.path, self.numbers = dispatcher, path, numbers
-        self._call: Callable = self._first_call
-        self._lock = threading.Lock()
-
-    def __call__(self, *arguments):
-        return self._call(*flat_values(arguments), *self.numbers)
-
-    def _first_call(self, *arguments):
-        with self._lock:
-            if self._call is not self.dispatcher:
-                with locked(self.path):
-                    result = self.dispatcher(*arguments)
-                self._call = self.dispatcher
-                return result
-        return self.dispatcher(*arguments)
+    return SimpleNamespace(**{d.__name__: Native(d, constants, bindings or {}, real) for d in drivers})
 
 
 class Team:
@@ -99,19 +55,19 @@ class Team:
         team.seconds = 0.0
         return team
 
-    def run(self, function: Callable, count: int, *arguments) -> None:
-        """Call `function(begin, end, *arguments)` on ranges that together cover 0 … count."""
+    def run(self, kernel: Callable, count: int, *arguments) -> None:
+        """Call `kernel(begin, end, *arguments)` on ranges that together cover 0 … count."""
         started = clock.perf_counter()
-        self._share(function, count, *arguments)
+        self._share(kernel, count, *arguments)
         self.seconds += clock.perf_counter() - started
 
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
         return wanted
 
-    def run_few(self, function: Callable, count: int, *arguments) -> None:
-        """Call `function(0, count, *arguments)` on this thread."""
+    def run_few(self, kernel: Callable, count: int, *arguments) -> None:
+        """Call `kernel(0, count, *arguments)` on this thread."""
         if count:
-            function(0, count, *arguments)
+            kernel(0, count, *arguments)
 
     def array(self, host: np.ndarray) -> np.ndarray:
         return host
@@ -146,6 +102,12 @@ class Team:
 
     def finish_asynchronous(self) -> None:
         pass
+
+    def mark(self) -> float:
+        return clock.perf_counter()
+
+    def seconds_between(self, first: float, then: float) -> float:
+        return then - first
 
     def _share(self, function: Callable, count: int, *arguments) -> None:
         if self._pool is None or count < 2:

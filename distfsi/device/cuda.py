@@ -98,16 +98,23 @@ class CupyRuntime:
 
         return cupyx.empty_pinned(max(count, 1), dtype)[:count]
 
-    def upload(self, there: Any, host: np.ndarray, queue: Queue) -> None:
+    def upload(self, array: Any, host: np.ndarray, queue: Queue) -> None:
         if host.size:
-            there.set(host, stream=self._streams[queue])
+            array.set(host, stream=self._streams[queue])
 
-    def download(self, host: np.ndarray, there: Any, queue: Queue) -> None:
+    def download(self, host: np.ndarray, array: Any, queue: Queue) -> None:
         if host.size:
-            there.get(stream=self._streams[queue], out=host, blocking=False)
+            array.get(stream=self._streams[queue], out=host, blocking=False)
 
     def order(self, first: Queue, then: Queue) -> None:
         self._streams[then].wait_event(self._streams[first].record())
 
     def synchronise(self, queue: Queue) -> None:
         self._streams[queue].synchronize()
+
+    def mark(self, queue: Queue) -> Any:
+        return self._streams[queue].record()
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        then.synchronize()
+        return 1e-3 * self._cupy.cuda.get_elapsed_time(first, then)

@@ -1,8 +1,8 @@
-"""The second writer: a driver and all the formulas it reaches -> CUDA C, from the same folded trees as `numba_text`.
+"""The second writer: a driver and all the formulas it reaches -> CUDA C, from the folded trees of device/llvm_text.py.
 
 A driver that is a loop `for i in range(begin, end):` over independent items becomes a kernel with one thread per item.
 The text is C++20 for NVRTC and, with device/host.h in front, for a compiler of the host; device/runtime.h gives it its
-types. What a driver is called with fixes the types of its kernel's parameters, as it does for numba.
+types. What a driver is called with fixes the types of its kernel's parameters, as it does on the CPU.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from distfsi.device.emit import Emission, callees_first, number_names
 from distfsi.device.exponential import EXPONENTIALS
 from distfsi.device.fold import Bound, Callee, NotInSubset, Source, parameters_of
+from distfsi.formulas.subset import Varying
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<",
@@ -45,7 +46,7 @@ TAKEN = frozenset(  # words of C++ and of device/runtime.h
     float friend goto inline int integer item length long mutable namespace new not operator or pack private protected
     public real register requires short signed sizeof static struct switch template this throw true try typedef typename
     union unsigned using virtual void volatile xor load store""".split()  # noqa: SIM905
-)
+) | {*WORDS.values()}
 
 
 @cache
@@ -131,7 +132,9 @@ def formulas_by_hand(
     return emission, {n: emission.add_bound(n) for n in names}
 
 
-def numbers_of(driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]) -> tuple[float, ...]:
+def numbers_of(
+    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]
+) -> tuple[float | Varying, ...]:
     """What the scene measures, in the order in which the driver's kernel gets it. Raises NotInSubset."""
     if hasattr(driver, "__by_hand__"):
         emission, _ = formulas_by_hand(driver, constants, bindings)

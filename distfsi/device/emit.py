@@ -1,13 +1,12 @@
-"""Emission: drivers and all the formulas they reach -> the text of one module, specialised for a scene.
+"""Emission: a driver and all the formulas it reaches, folded for a scene.
 
-The text is the same for the same scene, and the module is named by its hash, so that a compiled module can never be
-stale. `device/cuda_text.py` is a second writer of the same folded functions.
+Two writers make texts of them: `device/llvm_text.py` for the CPU and `device/cuda_text.py` for GPUs. What is compiled
+from a text is kept under its hash, so that it can never be stale.
 """
 
 from __future__ import annotations
 
 import ast
-import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,6 +18,7 @@ from distfsi.device.fold import (
     NUMBERS,
     Bound,
     Callee,
+    Changing,
     Fold,
     NotInSubset,
     Number,
@@ -28,20 +28,39 @@ from distfsi.device.fold import (
     is_fixed,
     literal,
 )
+from distfsi.formulas.subset import Varying
 
 
 class _Numbered(ast.NodeTransformer):
-    """Each Number becomes an item of the tuple of numbers."""
+    """Each Number, changing or not, becomes an item of the tuple of numbers."""
 
-    def __init__(self, numbers: dict[str, float]):
+    def __init__(self, numbers: dict[str, float | Varying]):
         self.numbers, self.places, self.found = numbers, list(numbers), False
 
-    def visit_Number(self, node: Number) -> ast.expr:
+    def visit_Number(self, node: Number | Changing) -> ast.expr:
         self.found = True
         if node.id not in self.numbers:
             self.numbers[node.id] = node.value
             self.places.append(node.id)
         return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
+
+    visit_Changing = visit_Number
+
+
+class Numbers:
+    """What a scene measures, as a kernel gets it behind its other arguments: called, it gives the values of now."""
+
+    def __init__(self, numbers: Iterable[float | Varying], real: Callable[[float], float]):
+        self._numbers, self._real = tuple(numbers), real
+        self._varies = any(isinstance(number, Varying) for number in self._numbers)
+        self._values = self._now()
+
+    def __call__(self) -> tuple[float, ...]:
+        return self._now() if self._varies else self._values
+
+    def _now(self) -> tuple[float, ...]:
+        values = (number.value if isinstance(number, Varying) else number for number in self._numbers)
+        return tuple(map(self._real, values))
 
 
 @dataclass
@@ -54,7 +73,7 @@ class Emission:
     constants: Mapping[str, object]
     bindings: Mapping[str, Bound | type]
     functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
-    numbers: dict[str, float] = field(default_factory=dict)
+    numbers: dict[str, float | Varying] = field(default_factory=dict)
     _callees: dict[tuple[Callable, type | None, str], Callee] = field(default_factory=dict)
 
     def add(self, function: Callable, scope: Bound | None = None, suffix: str = "", law: type | None = None) -> Callee:
@@ -101,11 +120,13 @@ class Emission:
             whole = ast.Tuple([ast.Name(name, ast.Load()) for name in names], ast.Load())
             tree.body.insert(0, ast.Assign([ast.Name(NUMBERS, ast.Store())], whole))
             ast.fix_missing_locations(tree)
+        else:
+            self.numbers.clear()  # only formulas that nobody calls asked for some
         return callee.name
 
     def _constant(self, source: Source, scope: Bound | None, suffix: str, name: str) -> ast.expr:
         if scope is not None and name in scope.constants:
-            return given(scope.constants[name], f"{scope.owner or suffix}.{name}")
+            return given(scope.constants[name], f"{scope.owner or suffix.removeprefix('__')}.{name}")
         if name in self.constants:
             return given(self.constants[name], name)
         value = source.function.__globals__[name]
@@ -137,52 +158,6 @@ def _fixed_result(tree: ast.FunctionDef) -> ast.expr | None:
     return copied(tree.body[0].value) if fixed else None
 
 
-class _TypedLiterals(ast.NodeTransformer):
-    """Every float literal becomes a module constant of the real type, so that float32 stays float32."""
-
-    def __init__(self):
-        self.names: dict[str, str] = {}
-
-    def visit_Constant(self, node: ast.Constant):
-        if not isinstance(node.value, float):
-            return node
-        return ast.Name(self.names.setdefault(repr(node.value), f"c{len(self.names)}_"), ast.Load())
-
-
-def numba_text(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str, runtime_version: str
-) -> tuple[str, tuple[float, ...]]:
-    """The module text for one driver, or for a formula as if it were one, and the numbers that it gets behind its other
-    arguments; `real` is "float64" or "float32"."""
-    emission = Emission(constants, bindings)
-    root = emission.root(driver)
-    literals, parts = _TypedLiterals(), []
-    for source, tree in callees_first(emission.functions):
-        text = ast.unparse(literals.visit(tree))
-        kind = "driver" if tree.name == root and source.kind == "formula" else source.kind
-        parts.append(f"# {source.place}\n@{kind}\n{text}")
-    values = [f"{name} = real({_number(value)})" for value, name in literals.names.items()]
-    head = [
-        f"# distfsi kernel module, runtime {runtime_version}",
-        "import numpy as np",
-        "from math import floor, log, pow, sqrt",
-        "from distfsi.device.runtime import driver, formula, helper, load, max_ as max, min_ as min, row, store",
-        f"from distfsi.device.runtime import exp_{real} as exp",
-        f"real = np.{real}",
-        "int32 = np.int32",
-        "",
-        "@helper",
-        "def workspace(n):",
-        "    return np.empty(n, real)",
-    ]
-    text = "\n".join(head) + "\n\n" + "\n".join(values) + "\n\n" + "\n\n".join(parts) + "\n"
-    return text, tuple(emission.numbers.values())
-
-
-def _number(text: str) -> str:
-    return {"inf": "np.inf", "-inf": "-np.inf", "nan": "np.nan"}.get(text, text)
-
-
 def callees_first(
     functions: Mapping[str, tuple[Source, ast.FunctionDef]], roots: Iterable[str] | None = None
 ) -> list[tuple[Source, ast.FunctionDef]]:
@@ -202,11 +177,6 @@ def callees_first(
     return list(ordered.values())
 
 
-def module_name(driver: Callable, text: str) -> str:
-    """The name under which a module text is stored and cached."""
-    return f"{driver.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
-
-
 def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound] | None = None) -> Callable:
     """`function` as plain Python with the scene's values in place: for set-up, tests and debugging.
 
@@ -219,5 +189,5 @@ def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping
     namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
     for _, tree in callees_first(emission.functions):
         exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)
-    formula, numbers = namespace[name], tuple(emission.numbers.values())
-    return (lambda *arguments: formula(*arguments, *numbers)) if numbers else formula
+    formula, numbers = namespace[name], Numbers(emission.numbers.values(), float)
+    return (lambda *arguments: formula(*arguments, *numbers())) if emission.numbers else formula

@@ -3,7 +3,8 @@
 The result is a plain `ast.FunctionDef` in which branches on what the scene fixes are resolved, `static_range` loops are
 unrolled and arithmetic with 0 and 1 has vanished. Whole numbers and truth values of a scene are literals. What a scene
 measures, its floats, are not: each becomes a `Number`, a place for a value that a kernel gets at run time, and so does
-arithmetic among them; only a 0.0 is folded, as what a scene does not use it does not compute. Records (named tuples and
+arithmetic among them; only a 0.0 is folded, as what a scene does not use it does not compute. Of a `Varying` one the
+kernel gets the value of the moment. Records (named tuples and
 laws, the types of parameters) are flattened to a parameter per field. Anything outside the subset is refused with the
 module and line it stands on.
 """
@@ -20,6 +21,8 @@ from dataclasses import dataclass, field, is_dataclass
 from dataclasses import fields as dataclass_fields
 from functools import cache
 from typing import get_type_hints
+
+from distfsi.formulas.subset import Varying
 
 NUMBERS = "numbers_"  # the tuple in which functions hand on what a scene measures
 MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
@@ -155,10 +158,10 @@ def flat_names(name: str, record: type) -> list[str]:
     return out
 
 
-def parameters_of(driver: Callable) -> list[str]:
-    """The flat parameters of a driver behind begin and end."""
-    found = Source(driver).parameters.items()
-    return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][2:]
+def parameters_of(function: Callable, first: int = 2) -> list[str]:
+    """The flat parameters of a function from the `first` on: by default those of a driver behind begin and end."""
+    found = Source(function).parameters.items()
+    return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][first:]
 
 
 def flat_values(arguments: Iterable[object]) -> Iterator[object]:
@@ -215,6 +218,14 @@ class Number(ast.Name):
         self.value = value
 
 
+class Changing(ast.Name):
+    """A number of a scene that changes from call to call: arithmetic with it is the kernel's."""
+
+    def __init__(self, id: str = "", value: Varying | None = None):
+        super().__init__(id, ast.Load())
+        self.value = value
+
+
 def literal(value: object) -> ast.expr:
     """The tree of a constant: a number, a truth value or a tuple of them."""
     if isinstance(value, tuple):
@@ -226,14 +237,37 @@ def given(value: object, label: str) -> ast.expr:
     """The tree of a constant that a scene gives, in which floats other than 0.0 are Numbers of that label."""
     if isinstance(value, tuple):
         return ast.Tuple([given(item, f"{label}[{k}]") for k, item in enumerate(value)], ast.Load())
-    return Number(label, float(value)) if isinstance(value, float) and value != 0.0 else ast.Constant(value)
+    if isinstance(value, Varying):
+        return Changing(f"given[{label!r}]", value)
+    is_number = isinstance(value, float) and value != 0.0
+    return Number(f"given[{label!r}]", float(value)) if is_number else ast.Constant(value)
+
+
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound | type]) -> dict[str, float | Varying]:
+    """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
+    found: dict[str, float | Varying] = {}
+
+    def put(value: object, label: str) -> None:
+        if isinstance(value, tuple):
+            for k, item in enumerate(value):
+                put(item, f"{label}[{k}]")
+        elif isinstance(value, (float, Varying)):
+            found[label] = value
+
+    for name, value in constants.items():
+        put(value, name)
+    for word, bound in bindings.items():
+        if isinstance(bound, Bound):
+            for name, value in bound.constants.items():
+                put(value, f"{bound.owner or word}.{name}")
+    return found
 
 
 def is_fixed(node: ast.expr) -> bool:
-    """Whether a tree is a constant, a Number, or a tuple of such: the same in every call."""
+    """Whether a tree is a constant, a number of the scene, or a tuple of such: the same wherever it stands."""
     if isinstance(node, ast.Tuple):
         return all(map(is_fixed, node.elts))
-    return isinstance(node, (ast.Constant, Number))
+    return isinstance(node, (ast.Constant, Number, Changing))
 
 
 def truth_of(node: ast.expr) -> tuple[bool, object]:
@@ -432,7 +466,7 @@ class Fold(ast.NodeTransformer):
 
     @staticmethod
     def identity(node: ast.BinOp) -> ast.expr | None:
-        """x + 0, 0 + x, x - 0, 0 - x, x * 0, x * 1, 0 / x, x / 1 without their second operand."""
+        """x + 0, 0 + x, x - 0, 0 - x, x * 0, x * 1, 0 / x, x / 1 without their second operand; 1 for N / N."""
 
         def is_(side: ast.expr, value: float) -> bool:
             return isinstance(side, ast.Constant) and not isinstance(side.value, bool) and side.value == value
@@ -450,6 +484,8 @@ class Fold(ast.NodeTransformer):
             return right if is_(left, 1) else left
         if op is ast.Div and (is_(left, 0) or is_(right, 1)):
             return left
+        if op is ast.Div and isinstance(left, Number) and isinstance(right, Number) and left.id == right.id:
+            return ast.copy_location(ast.Constant(1.0), node)
         return None
 
     def visit_UnaryOp(self, node: ast.UnaryOp):
@@ -547,6 +583,8 @@ class Fold(ast.NodeTransformer):
         out: list[ast.expr] = []
         stars = any(isinstance(argument, ast.Starred) for argument in call.args)
         wanted = [None] * len(call.args) if stars else [*parameters.values()]
+        if len(call.args) < len(wanted):  # a law without fields, bound by the scene, is not handed on
+            wanted = [class_ for class_ in wanted if class_ is None or fields_of(class_)]
         for k, argument in enumerate(call.args):
             record, class_ = self.record_of(argument), wanted[k] if k < len(wanted) else None
             if record is None and class_ is None:
@@ -555,9 +593,26 @@ class Fold(ast.NodeTransformer):
                 if class_ is not record[1]:
                     raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {record[1].__name__}")
                 out += [ast.Name(flat, ast.Load()) for flat in self.flat_parameters(record[0], record[1])]
+            elif made := self.made_record(argument):
+                if class_ is not made[0]:
+                    raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {made[0].__name__}")
+                out += made[1]
             else:  # a tuple that holds the fields
                 out += [ast.Subscript(argument, ast.Constant(k), ast.Load()) for k in range(len(fields_of(class_)))]
         return out
+
+    def made_record(self, node: ast.expr) -> tuple[type, list[ast.expr]] | None:
+        """The class and the fields, in order, of a record that is made where it is handed on."""
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id in self.locals:
+            return None
+        class_ = self.source.function.__globals__.get(node.func.id)
+        if not is_record(class_):
+            return None
+        names = list(fields_of(class_))
+        fields = dict(zip(names, node.args, strict=False)) | {word.arg: word.value for word in node.keywords}
+        if len(node.args) + len(node.keywords) != len(names) or fields.keys() != set(names):
+            raise self.refuse(node, f"{class_.__name__} has the fields {', '.join(names)}")
+        return class_, [fields[name] for name in names]
 
     def visit_Tuple(self, node: ast.Tuple):
         if isinstance(node.ctx, ast.Load):
@@ -569,6 +624,8 @@ class Fold(ast.NodeTransformer):
             if not self.is_fixed(*self.record_of(node.func.value)):
                 node.args.insert(0, node.func.value)
             node.func = ast.Name(ast.unparse(node.func), ast.Load())  # a formula of a law
+        if made := self.made_record(node):
+            return self.visit(ast.copy_location(ast.Tuple(made[1], ast.Load()), node))
         if not isinstance(node.func, ast.Name) or node.keywords:
             raise self.refuse(node, "call functions by their plain names, without keywords")
         name = node.func.id

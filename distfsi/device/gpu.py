@@ -28,7 +28,8 @@ class Queue(Enum):
 
 
 class Runtime(Protocol):
-    """What runs kernels: device/cuda.py or device/host.py. All but `synchronise` returns at once."""
+    """What runs kernels: device/cuda.py or device/host.py. `synchronise` and `seconds_between` wait, all else returns
+    at once."""
 
     def compile(self, kernel: Kernel, arguments: Sequence[Any]) -> Any:
         """The kernel for arguments like these."""
@@ -57,6 +58,12 @@ class Runtime(Protocol):
     def synchronise(self, queue: Queue) -> None:
         """Wait until all in the queue is done."""
 
+    def mark(self, queue: Queue) -> Any:
+        """The moment when all that is in the queue is done."""
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        """Between two such moments; waits for them."""
+
 
 class Gpu:
     """One GPU, used by one rank. `direct`: messages lie in its memory, not in pinned memory of the host."""
@@ -82,7 +89,7 @@ class Gpu:
         self,
         drivers: Iterable[Callable],
         constants: Mapping[str, object],
-        bindings: Mapping[str, Bound] | None = None,
+        bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",
     ) -> SimpleNamespace:
         """The drivers as kernels; each is compiled at its first call."""
@@ -145,6 +152,12 @@ class Gpu:
 
     def finish_asynchronous(self) -> None:
         self._wait(Queue.ASYNCHRONOUS)
+
+    def mark(self) -> Any:
+        return self.runtime.mark(Queue.MAIN)
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        return self.runtime.seconds_between(first, then)
 
     def _wait(self, queue: Queue) -> None:
         """The host waits while the kernels run: that is the time they take, as far as it shows."""

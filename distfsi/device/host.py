@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -18,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from distfsi.device.cache import cache_directory, locked
+from distfsi.device.cache import cache_directory, file_name, locked
 from distfsi.device.cuda_text import dtype_of
 from distfsi.device.gpu import Queue
-from distfsi.device.kernel import Kernel, Launch, file_name
+from distfsi.device.kernel import Kernel, Launch
 
 # No contraction of a * b + c, as on the GPU: the bits are those of the CPU's kernels.
 FLAGS = ("-std=c++20", "-O1", "-ffp-contract=off", "-fwrapv", "-fPIC", "-shared", "-w", "-x", "c++")
@@ -110,6 +111,17 @@ class Task:
             self.work()
 
 
+class Moment(Task):
+    """When all before it is done: `time` [s]."""
+
+    def __init__(self, after: list[Task]):
+        super().__init__(self._note, after)
+        self.time = 0.0
+
+    def _note(self) -> None:
+        self.time = clock.perf_counter()
+
+
 class HostRuntime:
     """Runs kernels on the host, as late as their order allows or as early; both are legal on a GPU."""
 
@@ -137,11 +149,11 @@ class HostRuntime:
     def pinned(self, count: int, dtype: np.dtype) -> np.ndarray:
         return np.empty(count, dtype)
 
-    def upload(self, there: HostArray, host: np.ndarray, queue: Queue) -> None:
-        self._add(queue, partial(np.copyto, there.memory, host))
+    def upload(self, array: HostArray, host: np.ndarray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, array.memory, host))
 
-    def download(self, host: np.ndarray, there: HostArray, queue: Queue) -> None:
-        self._add(queue, partial(np.copyto, host, there.memory))
+    def download(self, host: np.ndarray, array: HostArray, queue: Queue) -> None:
+        self._add(queue, partial(np.copyto, host, array.memory))
 
     def order(self, first: Queue, then: Queue) -> None:
         self._last[then] = Task(lambda: None, [self._last[then], self._last[first]])
@@ -149,12 +161,24 @@ class HostRuntime:
     def synchronise(self, queue: Queue) -> None:
         self._last[queue].do()
 
+    def mark(self, queue: Queue) -> Moment:
+        moment = Moment([self._last[queue]])
+        self._put(queue, moment)
+        return moment
+
+    def seconds_between(self, first: Moment, then: Moment) -> float:
+        then.do()
+        return then.time - first.time
+
     def is_idle(self, queue: Queue) -> bool:
         """Whether all in the queue is done."""
         return self._last[queue].done
 
     def _add(self, queue: Queue, work: Callable[[], None]) -> None:
-        self._last[queue] = task = Task(work, [self._last[queue]])
+        self._put(queue, Task(work, [self._last[queue]]))
+
+    def _put(self, queue: Queue, task: Task) -> None:
+        self._last[queue] = task
         if not self.late:
             task.do()
 

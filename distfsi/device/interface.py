@@ -36,7 +36,7 @@ class Device(Protocol):
         self,
         drivers: Iterable[Callable],
         constants: Mapping[str, object],
-        bindings: Mapping[str, Bound] | None = None,
+        bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",
     ) -> SimpleNamespace:
         """The drivers, specialised for a scene, under their own names. Raises NotInSubset."""
@@ -82,6 +82,12 @@ class Device(Protocol):
     def finish_asynchronous(self) -> None:
         """Wait until all asynchronous work is done."""
 
+    def mark(self) -> Any:
+        """The moment when all that was asked for before is done, but for asynchronous work that is not joined."""
+
+    def seconds_between(self, first: Any, then: Any) -> float:
+        """Between two such moments; waits for them."""
+
 
 class DualArray:
     """An array of the device and, when it is looked at, its copy on the host."""
@@ -126,6 +132,9 @@ class Columns(MutableMapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._pairs[name].host()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._pairs  # without a copy to the host
 
     def __setitem__(self, name: str, host: np.ndarray) -> None:
         self._pairs[name] = DualArray(self.device, np.ascontiguousarray(host))

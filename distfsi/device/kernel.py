@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, numbers_of, text_by_hand
+from distfsi.device.emit import Numbers
 from distfsi.device.fold import Bound, flat_values, parameters_of
 from distfsi.device.markers import ByHand
 
@@ -41,13 +41,13 @@ class Kernel:
         return self.driver.__name__
 
     @cached_property
-    def numbers(self) -> tuple[np.floating, ...]:
+    def numbers(self) -> Numbers:
         """What the scene measures: a kernel gets it behind its other arguments."""
-        return tuple(map(np.dtype(self.real).type, numbers_of(self.driver, self.constants, self.bindings)))
+        return Numbers(numbers_of(self.driver, self.constants, self.bindings), np.dtype(self.real).type)
 
     def given(self, arguments: Iterable[object]) -> list[object]:
         """What the kernel is called with: the arguments (without begin and end), records flattened, and the numbers."""
-        return [*flat_values(arguments), *self.numbers]
+        return [*flat_values(arguments), *self.numbers()]
 
     def text(self, arguments: Sequence[object]) -> str:
         """The CUDA C for arguments like those that are `given`. Raises NotInSubset."""
@@ -72,8 +72,3 @@ class Kernel:
 
     def _named(self, arguments: Sequence[object]) -> dict[str, object]:
         return dict(zip(parameters_of(self.driver), arguments, strict=False))
-
-
-def file_name(name: str, text: str) -> str:
-    """The name under which what is compiled from a text is kept."""
-    return f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"

@@ -17,8 +17,7 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
-from distfsi.device.cache import cache_directory, locked, write_whole
-from distfsi.device.kernel import file_name
+from distfsi.device.cache import cache_directory, file_name, locked, write_whole
 
 # No contraction of a * b + c, IEEE division and roots, no flushing of denormals: the bits are those of the CPU.
 FLAGS = ("--std=c++20", "--fmad=false", "--prec-div=true", "--prec-sqrt=true", "--ftz=false", "--ptxas-options=-v")

@@ -1,4 +1,4 @@
-// What emitted CUDA C needs: integers, arrays and tuples with the meanings that Python and numba give them.
+// What emitted CUDA C needs: integers, arrays and tuples with the meanings that Python gives them.
 // `real` is defined above.
 
 namespace distfsi {
@@ -165,7 +165,7 @@ template <int K, class T, int N> DEVICE auto item(Array<T, N> array) { return ar
 
 // ---- mathematics ------------------------------------------------------------------------------------------------------
 
-// As numba's: of NaN and a number, the second one. fmin and fmax choose otherwise.
+// Of NaN and a number, the second one. fmin and fmax choose otherwise.
 template <class A, class B> DEVICE auto minimum(A a, B b)
 {
     typedef typename Common<A, B>::type type;

@@ -1,103 +1,116 @@
-"""What emitted numba modules import: the decorators behind the markers, and raw loads and stores.
+"""What kernel modules import (device/native.py): numba compiles a driver around the LLVM IR that is written for it.
 
-Fast rows need two things numba does not do by itself: arguments that do not alias (a compile option it has inside but
-does not show) and indexing without wrap-around. Both are held by tests/test_vectorised.py. Fast math stays off: NaN
-checks stay valid and results do not depend on how a loop was vectorised.
+numba unpacks what Python calls the driver with, releases the GIL, optimises the whole and keeps the machine code on
+disk; its own reading, typing and lowering of Python, of which most of the time to the first step would go, sees one
+call.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import llvmlite.binding as llvm
 from llvmlite import ir
-from numba import literal_unroll, njit, types
-from numba.core.options import TargetOptions
-from numba.core.registry import cpu_target
+from numba import njit, types
+from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from distfsi.device.exponential import EXPONENTIALS, Exponential
+from distfsi.device.llvm_types import BOOL, INTEGER, REALS, SHORT, Array, Type, leaf_types
 
-VERSION = "4"
+VERSION = "1"
+WRITERS: dict[str, Callable[[tuple[Type, ...]], tuple[str, str, Type | None]]] = {}
 
-_OPTIONS = cpu_target.options
-if not hasattr(_OPTIONS, "noalias"):
-    _OPTIONS.noalias = TargetOptions.Mapping("noalias")
+driver = njit(error_model="numpy", nogil=True, cache=True, no_cfunc_wrapper=True)
 
-# Only drivers are called from Python; without wrappers the others compile a fifth faster.
-_INSIDE = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-formula = njit(forceinline=True, **_INSIDE)
-helper = njit(forceinline=True, **_INSIDE)
-row = njit(noalias=True, **_INSIDE)
-driver = njit(error_model="numpy", nogil=True, cache=True)
-
-
-@formula
-def min_(a, b):
-    """a if a < b else b, as on every device (numba's own min treats NaN otherwise)."""
-    return a if a < b else b
+_NUMBERS = {
+    INTEGER: types.int64,
+    SHORT: types.int32,
+    BOOL: types.boolean,
+    "double": types.float64,
+    "float": types.float32,
+}
+_LEAVES = {"ptr": ir.PointerType(), INTEGER: ir.IntType(64), SHORT: ir.IntType(32), BOOL: ir.IntType(1)}
+_LEAVES |= {"double": ir.DoubleType(), "float": ir.FloatType()}
 
 
-@formula
-def max_(a, b):
-    """a if a > b else b, as on every device."""
-    return a if a > b else b
+def body_of(module: str) -> Callable:
+    """The body of a driver, to be called with all its arguments in one tuple: `WRITERS[module]` gives for their types
+    the name of a function, the text that defines it, and the type that it returns."""
+
+    @intrinsic
+    def body(typing_context, arguments):
+        name, text, returns = WRITERS[module](tuple(map(_type_of, arguments.types)))
+
+        def code(context, builder, signature, given):
+            leaves = []
+            for k, kind in enumerate(arguments.types):
+                leaves += _leaves(context, builder, kind, builder.extract_value(given[0], k))
+            context.active_code_library.add_linking_library(_Written(text, context.codegen()))
+            kinds = [_LEAVES[leaf] for leaf in ([] if returns is None else leaf_types(returns))]
+            result = ir.VoidType() if not kinds else kinds[0] if len(kinds) == 1 else ir.LiteralStructType(kinds)
+            function_type = ir.FunctionType(result, [leaf.type for leaf in leaves])
+            called = builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), leaves)
+            if len(kinds) < 2:
+                return called if kinds else context.get_dummy_value()
+            parts = [builder.extract_value(called, k) for k in range(len(kinds))]
+            return context.make_tuple(builder, signature.return_type, parts)
+
+        return _numba_type(returns)(arguments), code
+
+    return body
 
 
-@intrinsic
-def load(typing_context, array, index):
-    """array.flat[index] of a contiguous array: no wrap-around, no bounds check."""
+class _Written:
+    """A text as a library that numba links: into the module of a driver, before that is optimised."""
 
-    def code(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        return builder.load(builder.gep(data, [arguments[1]], inbounds=True))
+    def __init__(self, text: str, codegen: Any):
+        self._module = llvm.parse_assembly(text)
+        self._module.triple, self._module.data_layout = llvm.get_process_triple(), str(codegen.target_data)
+        self._reload_init: set[str] = set()
 
-    return array.dtype(array, types.intp), code
+    def _ensure_finalized(self) -> None:
+        """It needs no machine code of its own."""
 
-
-@intrinsic
-def store(typing_context, array, index, value):
-    """array.flat[index] = value of a contiguous array: no wrap-around, no bounds check."""
-
-    def code(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        builder.store(arguments[2], builder.gep(data, [arguments[1]], inbounds=True))
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, array.dtype), code
+    def _get_module_for_linking(self) -> llvm.ModuleRef:
+        return self._module
 
 
-@intrinsic
-def _two_to_the(typing_context, shifted):
-    """2^n, where `shifted` is n plus 1.5 times 2 to the number of mantissa bits: n then stands in the lowest bits."""
-
-    def code(context, builder, signature, arguments):
-        bits, mantissa, bias = (64, 52, 1023) if signature.args[0] == types.float64 else (32, 23, 127)
-        integer = ir.IntType(bits)
-        n = builder.bitcast(arguments[0], integer)
-        exponent = builder.add(builder.shl(n, ir.Constant(integer, mantissa)), ir.Constant(integer, bias << mantissa))
-        return builder.bitcast(exponent, arguments[0].type)
-
-    return shifted(shifted), code
-
-
-def _exponential(numbers: Exponential):
-    """The exponential in arithmetic that vectorises (device/exponential.py)."""
-    lowest, highest, shift, per_two = numbers.lowest, numbers.highest, numbers.shift, numbers.per_two
-    high, low, coefficients = numbers.high, numbers.low, numbers.coefficients
-    one = type(high)(1.0)
-
-    @formula
-    def exponential(x):
-        x = lowest if x < lowest else x
-        x = highest if x > highest else x
-        shifted = x * per_two + shift
-        n = shifted - shift
-        r = (x - n * high) - n * low
-        total = coefficients[0] * one
-        for k in literal_unroll(coefficients[1:]):
-            total = total * r + k
-        return total * _two_to_the(shifted)
-
-    return exponential
+def _type_of(kind: types.Type) -> Type:
+    """A type of numba as one of device/llvm_types.py. Raises TypingError for what no kernel takes."""
+    if isinstance(kind, types.Array):
+        if kind.layout != "C":
+            raise TypingError("kernels take contiguous arrays")
+        return Array(str(kind.dtype) if kind.dtype is not types.boolean else "bool", kind.ndim)
+    if isinstance(kind, types.BaseTuple):
+        return tuple(map(_type_of, kind.types))
+    if isinstance(kind, types.Integer):
+        return INTEGER
+    if isinstance(kind, types.Boolean):
+        return BOOL
+    if isinstance(kind, types.Float):
+        return REALS[kind.name]
+    raise TypingError(f"kernels take no {kind}")
 
 
-exp_float64 = _exponential(EXPONENTIALS["float64"])
-exp_float32 = _exponential(EXPONENTIALS["float32"])
+def _numba_type(kind: Type | None) -> types.Type:
+    """The type of numba of what a driver returns."""
+    if kind is None:
+        return types.none
+    return types.Tuple([_numba_type(part) for part in kind]) if isinstance(kind, tuple) else _NUMBERS[kind]
+
+
+def _leaves(context: Any, builder: Any, kind: types.Type, value: Any) -> Sequence[Any]:
+    """The leaves of a value of numba, as device/llvm_types.py orders them."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        return [array.data, *cgutils.unpack_tuple(builder, array.shape, kind.ndim)]
+    if isinstance(kind, types.BaseTuple):
+        parts = [builder.extract_value(value, k) for k in range(len(kind.types))]
+        return [
+            leaf for part, own in zip(parts, kind.types, strict=True) for leaf in _leaves(context, builder, own, part)
+        ]
+    if isinstance(kind, types.Integer):
+        return [context.cast(builder, value, kind, types.int64)]
+    return [value]

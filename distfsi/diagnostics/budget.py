@@ -1,5 +1,5 @@
-"""What is kept: masses, momentum and energy of fluid and solid, what left the domain, and what the coupling made or
-lost."""
+"""The conservation budget: masses, momentum and energy of fluid and solid, what has left the domain, and what the
+coupling has created, by cause."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ AXES = "xyz"
 
 
 class Budget:
-    """Closes the books of a run: fluid + solid + left through boundaries - made by the coupling = constant.
+    """Of a run: fluid + solid + left through boundaries - created by the coupling is constant, but for the conservation
+    error.
 
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """
@@ -42,7 +43,7 @@ class Budget:
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
             self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
-            self.columns += [f"ledger {cause} {name}" for cause in coupling.causes for name in self.conserved]
+            self.columns += [f"coupling {cause} {name}" for cause in coupling.causes for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
     def row(self, simulation) -> dict[str, float | int | str]:
@@ -56,7 +57,7 @@ class Budget:
         }
         balance, size = np.zeros(len(self.conserved)), np.zeros(len(self.conserved))
 
-        def book(label: str, amounts: np.ndarray, sign: float = 1.0, magnitude: np.ndarray | None = None) -> None:
+        def add(label: str, amounts: np.ndarray, sign: float = 1.0, magnitude: np.ndarray | None = None) -> None:
             nonlocal balance, size
             values.update({f"{label} {name}": amount for name, amount in zip(self.conserved, amounts, strict=True)})
             balance, size = balance + sign * amounts, size + (np.abs(amounts) if magnitude is None else magnitude)
@@ -64,7 +65,7 @@ class Budget:
         left = np.zeros(len(self.conserved))
         if self.fluid:
             totals, magnitude = self.fluid.totals(self.coupling.volume if self.coupling else None)
-            book("fluid", totals, magnitude=magnitude)
+            add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
         if self.solid:
@@ -80,13 +81,14 @@ class Budget:
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
-        book("left", left)
+        add("left", left)
         if self.coupling:
-            parts = self.solid.sub_steps
-            values |= {"sub-steps": parts, "sub-steps limited by": simulation.name_solid_limit() if parts > 1 else ""}
+            step = simulation.last_step
+            limit = step.name_particle(simulation.communicator) if step.sub_steps > 1 else ""
+            values |= {"sub-steps": step.sub_steps, "sub-steps limited by": limit}
             values |= {f"trapped {n}": m for n, m in zip(self.conserved, self.coupling.trapped(), strict=False)}
-            for cause, amounts in self.coupling.ledger().items():
-                book(f"ledger {cause}", amounts, -1.0)
+            for cause, amounts in self.coupling.budget_by_cause().items():
+                add(f"coupling {cause}", amounts, -1.0)
         if np.isnan(self._start).all():
             self._start = balance
         size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
@@ -103,11 +105,11 @@ class Budget:
         self._start, self._scale = snapshot["values"]["start"], snapshot["values"]["scale"]
 
     def summary(self, simulation) -> str:
-        """One sentence on how well the books close; collective."""
+        """Collective. One sentence on the conservation error, and on what the coupling has created."""
         row = self.row(simulation)
         worst = max(abs(row[f"drift {name}"]) for name in self._names)
-        text = f"Books close to {worst:.1e}."
+        text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(row[f"ledger {cause} energy [J]"] for cause in self.coupling.causes)
-            text += f" The coupling made {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
+            energy = sum(row[f"coupling {cause} energy [J]"] for cause in self.coupling.causes)
+            text += f" The coupling created {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
         return text

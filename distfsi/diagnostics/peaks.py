@@ -1,4 +1,4 @@
-"""Fields derived from the flow for the output: what cells remember of a blast, and the numerical schlieren picture."""
+"""What cells remember of a blast."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from math import prod
 
 import numpy as np
 
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
+from distfsi.coupling.protocol import Coupling
 from distfsi.device.interface import DualArray
+from distfsi.diagnostics.derived import padded
 from distfsi.diagnostics.kernels import peaks as kernels
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Snapshot
@@ -69,43 +70,3 @@ class Peaks:
         """Go on from a snapshot."""
         self.fluid.blocks.without_ghosts(self.fields.host())[:] = snapshot["cells"]["fields"]
         self.fields.changed()
-
-
-def schlieren(fluid: Fluid, covered: np.ndarray | None) -> np.ndarray:
-    """Collective. |grad rho| over its largest value in the domain, (local blocks, bz, by, bx), NaN where covered.
-
-    A picture is exp(-k schlieren) with k about 15 (Quirk and Karni, J. Fluid Mech. 318, 1996, Eq. A1). Central
-    differences; one-sided next to a covered cell.
-    """
-    fluid.exchange_ghosts(fluid.stages[0])
-    density = fluid.state[:, : fluid.model.phases].astype(np.float64).sum(axis=1)
-    usable = np.ones(density.shape, dtype=bool) if covered is None else ~covered
-    squared = np.zeros_like(density)
-    for axis, h in enumerate(fluid.blocks.grid.spacing[: fluid.model.dimensions]):
-        squared += (_slope(density, usable, 3 - axis) / h) ** 2
-    gradient = padded(fluid, np.sqrt(squared), covered)
-    largest = fluid.blocks.communicator.maximum([np.nanmax(gradient, initial=0.0)])[0]
-    return gradient / largest if largest > 0.0 else gradient
-
-
-def _slope(values: np.ndarray, usable: np.ndarray, axis: int) -> np.ndarray:
-    """Mean of the differences to the usable neighbours along `axis`; zero in the outermost layers."""
-    values, usable = np.moveaxis(values, axis, -1), np.moveaxis(usable, axis, -1)
-    slope = np.zeros_like(values)
-    difference, both = values[..., 1:] - values[..., :-1], usable[..., 1:] & usable[..., :-1]
-    difference, count = np.where(both, difference, 0.0), both[..., 1:].astype(int) + both[..., :-1]
-    slope[..., 1:-1] = (difference[..., 1:] + difference[..., :-1]) / np.maximum(count, 1)
-    return np.moveaxis(slope, -1, axis)
-
-
-def padded(fluid: Fluid, field: np.ndarray, covered: np.ndarray | None) -> np.ndarray:
-    """The active cells of `field` (local blocks, Z, Y, X), padded with zeros to whole blocks; NaN where covered."""
-    blocks = fluid.blocks
-    result = np.zeros((blocks.local_count, *blocks.block_cells[::-1]))
-    for block in range(blocks.local_count):
-        x, y, z = blocks.extent[block]
-        part = result[block, :z, :y, :x]
-        part[:] = fluid.active(field, block)
-        if covered is not None:
-            part[fluid.active(covered, block)] = np.nan
-    return result

@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from distfsi.coupling.immersed_boundary.immersed_boundary import Coupling
 from distfsi.coupling.kernels.cells import COVERED
+from distfsi.coupling.protocol import Coupling
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.regions import source_cell
 
@@ -30,10 +30,10 @@ class FluidSampler:
         D, grid = fluid.model.dimensions, fluid.blocks.grid
         self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in AXES[:D])]
         self.columns += ["volume_fraction"] if fluid.model.phases == 2 else []
-        place = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
-        low = np.floor(place)
+        scaled = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
+        low = np.floor(scaled)
         corners = np.array(list(product((0, 1), repeat=D)))
-        share = (place - low)[:, None]
+        share = (scaled - low)[:, None]
         self._weight = np.where(corners == 1, share, 1.0 - share).prod(axis=2)
         self._home = self._weight.argmax(axis=1)  # the corner in whose cell the point is
         self._find_cells(low.astype(np.int64)[:, None] + corners)
@@ -53,13 +53,13 @@ class FluidSampler:
         self._own = np.flatnonzero((block >= 0) & (block < blocks.local_count))
         block = block[self._own]
         x, y, z = (cells[self._own] - blocks.origin[block] + grid.ghosts).T
-        self._place = (block, slice(None), z, y, x)
+        self._index = (block, slice(None), z, y, x)
 
     def values(self) -> np.ndarray:
         """Collective. The values (n, columns) at the points, on every rank."""
         D, P, fluid = self.fluid.model.dimensions, self.fluid.model.phases, self.fluid
-        covered = self.coupling.kind.host()[self._place] >= COVERED if self.coupling else np.zeros((len(self._own), 1))
-        rows = np.hstack([self._own[:, None], fluid.state[self._place], covered], dtype=np.float64)
+        covered = self.coupling.kind.host()[self._index] >= COVERED if self.coupling else np.zeros((len(self._own), 1))
+        rows = np.hstack([self._own[:, None], fluid.state[self._index], covered], dtype=np.float64)
         rows = fluid.blocks.communicator.concatenate(rows)
         rows = rows[np.argsort(rows[:, 0])]
         U, covered = np.ascontiguousarray(rows[:, 1:-1].T), rows[:, -1] == 1.0

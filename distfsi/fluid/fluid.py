@@ -10,11 +10,17 @@ import numpy as np
 from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
 from distfsi.fluid.initial import InitialState
-from distfsi.fluid.kernels import stage as kernels
+from distfsi.fluid.kernels.records import StageStep, States
+from distfsi.fluid.kernels.signals import fastest_signals
+from distfsi.fluid.kernels.stage import advance_tiles
+from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
+from distfsi.fluid.tiles import Tiling
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels.regions import copy_regions
+from distfsi.narrowing import present
+from distfsi.scene.description import Fluid as FluidOfScene
 from distfsi.scene.description import Scene
 
 
@@ -41,72 +47,43 @@ class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step. stages: those that make a step.
+    step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
+    cells; of the others.
     """
 
-    def __init__(self, scene: Scene, model, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
         self.model, self.blocks, self.team = model, blocks, team
         self.stages = SCHEMES[scene.time.scheme]
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
-        real = scene.fluid.precision
-        self.kernels = team.build(
-            [kernels.advance_tiles, kernels.fastest_signals], model.constants, model.bindings, real
-        )
+        given = present(scene.fluid)
+        real = given.precision
+        self.kernels = team.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
-        initial = InitialState(scene.fluid, model)
-        self.inflow = self._inflow_states(scene, initial)
+        initial = InitialState(given, model)
+        self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
-            buffer[:] = initial.of(scene.fluid.regions[0].state)[:, None, None, None]
+            buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
         self._buffers = [DualArray(team, buffer) for buffer in buffers]
-        self._lay_tiles(team.tile_cells(scene.performance.tile_cells))
+        self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
+        self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
+        waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
+        self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
+        self._stages, self._calm = team.array(self.rest.stages), team.array(self.rest.calm)
         self._extent = team.array(blocks.extent)
         self._fastest = DualArray(team, np.zeros(blocks.local_count))
-        self._before = self._booked()
+        self._before = self._accounted()
         self._signal: float | None = None
-        self.volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
+        self._volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
-    def _inflow_states(self, scene: Scene, initial: InitialState) -> np.ndarray:
+    def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
-        for axis, sides in enumerate(scene.fluid.inflow):
+        for axis, sides in enumerate(given.inflow):
             for side, state in enumerate(sides):
                 if state is not None:
                     states[axis, side] = initial.of(state)
         return states
-
-    def _lay_tiles(self, tile_cells: tuple[int, ...]) -> None:
-        """Cut the blocks into tiles; those whose ghosts come from other ranks are computed last."""
-        blocks, grid = self.blocks, self.blocks.grid
-        size = [min(t, n) for t, n in zip((*tile_cells, 1, 1)[:3], blocks.block_cells, strict=True)]
-        rows, places = [], []
-        for block in range(blocks.local_count):
-            extent, origin = blocks.extent[block], blocks.origin[block]
-            starts = [range(0, extent[axis], size[axis]) for axis in range(3)]
-            for z in starts[2]:
-                for y in starts[1]:
-                    for x in starts[0]:
-                        first = np.array([x, y, z])
-                        cells = np.minimum(size, extent - first)
-                        rows.append([block, *(first + grid.ghosts), *cells, self._sides(origin + first, cells)])
-                        places.append(origin + first)
-        self.tiles = np.array(rows, dtype=np.int64).reshape(-1, 8)
-        waiting = np.isin(self.tiles[:, kernels.BLOCK], self.exchange.waiting)
-        self._ready_tiles, self._waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
-        self._tile_box = tuple(n + 2 * g for n, g in zip(size, grid.ghosts, strict=True))
-        self._table = self.team.array(self.tiles)
-        self._through = DualArray(self.team, np.zeros((len(self.tiles), 6, self.model.conserved)))
-        self._limited = DualArray(self.team, np.zeros(len(self.tiles), dtype=np.int64))
-        self.rest = Rest(blocks, np.array(places, dtype=np.int64).reshape(-1, 3), size)
-
-    def _sides(self, first: np.ndarray, cells: np.ndarray) -> int:
-        """Bits of the domain's sides that a tile touches; a periodic side is no side."""
-        grid, bits = self.blocks.grid, 0
-        for axis in range(grid.dimensions):
-            for side, touches in enumerate((first[axis] == 0, first[axis] + cells[axis] == grid.cells[axis])):
-                if touches and grid.boundaries[axis][side] != "periodic":
-                    bits |= 1 << (2 * axis + side)
-        return bits
 
     # ---- one step ----------------------------------------------------------------------------------------------------
 
@@ -136,15 +113,25 @@ class Fluid:
         """Where a stage leaves its state; asked before the stage."""
         return self._buffers[_output(stage.number)].device
 
+    def average_sources(self, start: float, dt: float) -> None:
+        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
+        if self.model.body_force.average_over(start, dt):
+            self.rest.wake()
+
+    def set_volumes(self, volumes: DualArray) -> None:
+        """From now on fluid fills cells in part: by the first of the fields (local blocks, fields, Z, Y, X), which who
+        gives them changes between stages. By default all cells are whole."""
+        self._volumes = volumes
+
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
-        self._before = self._booked()
+        self._before = self._accounted()
         self._signal = None
 
     def reject(self) -> None:
         """Go back to the state before the last step."""
         self._buffers[:2] = self._buffers[1::-1]
-        for pair, before in zip((self._through, self._limited), self._before, strict=True):
+        for pair, before in zip((self.tiling.through, self.tiling.limited), self._before, strict=True):
             pair.host()[:] = before
             pair.changed()
         self.rejected_steps += 1
@@ -156,23 +143,26 @@ class Fluid:
         self._signal = self.fastest_signal()
         return bool(np.isfinite(self.blocks.communicator.maximum(np.array([self._signal]))[0]))
 
-    def _booked(self) -> tuple[np.ndarray, np.ndarray]:
+    def _accounted(self) -> tuple[np.ndarray, np.ndarray]:
         """Copies of what has left through the domain's sides, and of the number of limited faces."""
-        return self._through.host().copy(), self._limited.host().copy()
+        return self.tiling.through.host().copy(), self.tiling.limited.host().copy()
+
+    def start_exchange(self, stage: Stage) -> None:
+        """Start to fill the ghost cells of the stage's input; `exchange.finish` ends it."""
+        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        self.start_exchange(stage)
         self.exchange.finish()
 
-    def advance_stage(self, stage: Stage, dt: float) -> None:
-        """Exchange ghosts and advance one stage; tiles that need no other rank are computed while messages travel."""
+    def begin_stage(self) -> None:
+        """Find out which tiles are at rest."""
         self.rest.begin_stage()
         self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
-        self.advance_tiles(self._ready_tiles, stage, dt)
-        self.exchange.finish()
-        self.advance_tiles(self._waiting_tiles, stage, dt)
+
+    def end_stage(self, stage: Stage) -> None:
+        """After all tiles were advanced; after the last stage the state is that of the new time."""
         self.rest.stages = self.team.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
@@ -180,17 +170,18 @@ class Fluid:
             self._buffers.insert(0, new)
 
     def advance_tiles(self, tiles: np.ndarray, stage: Stage, dt: float) -> None:
-        """Advance the tiles of the given numbers by one stage; those that are calm only if their fluxes are booked."""
-        tiles = tiles[~self.rest.calm[tiles] | (self.tiles[tiles, kernels.SIDES] > 0)]
-        output, chosen = self._buffers[_output(stage.number)], self.team.array(tiles)
+        """Advance the tiles of the given numbers by one stage; those that are calm only if their fluxes are accounted
+        for."""
+        tiles = tiles[~self.rest.calm[tiles] | self.tiling.touches_side[tiles]]
+        output = self._buffers[_output(stage.number)]
         real = output.dtype.type
-        self.team.run(
-            self.kernels.advance_tiles, len(tiles), chosen, self._table, self._calm, self._stages,
-            self._buffers[0].device, self.input_of(stage), output.device, self.volumes.device, self._through.device,
-            self._limited.device, real(stage.b), real(dt), stage.weight, *self.rates(dt), *self._tile_box,
-        )  # fmt: skip
+        states = States(self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device)
+        step = StageStep(real(stage.b), real(dt), stage.weight, *self.rates(dt))
+        given = self.tiling.arguments(self._calm, self._stages)
+        chosen = self.team.array(tiles)
+        self.team.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
 
-    def rates(self, dt: float) -> list:
+    def rates(self, dt: float) -> list[Any]:
         """dt/h [s/m] along each of three axes, in the fluid's precision."""
         real = self._buffers[0].dtype.type
         return [real(dt / h) for h in self.blocks.grid.spacing]
@@ -198,7 +189,7 @@ class Fluid:
     def wake(self, blocks: np.ndarray) -> None:
         """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
         true; to be called before the next stage."""
-        self.rest.wake(blocks[self.tiles[:, kernels.BLOCK]])
+        self.rest.wake(blocks[self.tiling.block])
         self._signal = None
 
     def fastest_signal(self) -> float:
@@ -210,11 +201,10 @@ class Fluid:
             return 0.0
         real = self._buffers[0].dtype.type
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
-        changed = np.unique(self.tiles[~self.rest.settled, kernels.BLOCK])
-        self.team.run(
-            self.kernels.fastest_signals, len(changed), self.team.array(changed), self._buffers[0].device,
-            self._first_active(), self._extent, *inverse, self._fastest.device,
-        )  # fmt: skip
+        changed = np.unique(self.tiling.block[~self.rest.settled])
+        cells = self._buffers[0].device, self._first_active(), self._extent
+        chosen = self.team.array(changed)
+        self.team.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
         return float(np.max(self._fastest.host()))
 
     @property
@@ -222,7 +212,7 @@ class Fluid:
         """(local blocks,) the last fastest signal [1/s] of each block."""
         return self._fastest.host()
 
-    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple, str]:
+    def fastest_cell(self, signals: np.ndarray) -> tuple[float, tuple[int, ...], str]:
         """The fastest of `signals`, those of this rank's blocks before the last step, where its block begins in the
         grid, and its cell in words. Of equal ones that whose block comes last along z, y, x."""
         if not self.blocks.local_count:
@@ -236,11 +226,11 @@ class Fluid:
         speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
         signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
         cell = np.unravel_index(np.nanargmax(signal), signal.shape)
-        place = self._place(block, cell)
-        text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({place}) m"
+        position = self._position(block, cell)
+        text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({position}) m"
         return float(signals[block]), tuple(self.blocks.origin[block, ::-1].tolist()), text
 
-    def _place(self, block: int, cell: tuple) -> str:
+    def _position(self, block: int, cell: tuple[Any, ...]) -> str:
         """The center of the cell (z, y, x) of a local block, in words."""
         centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
         return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
@@ -261,8 +251,8 @@ class Fluid:
         return {
             "cells": {"state": self.blocks.without_ghosts(self.state)},
             "sums": {
-                "through": self._through.host(),
-                "limited": self._limited.host().astype(np.float64),
+                "through": self.tiling.through.host(),
+                "limited": self.tiling.limited.host().astype(np.float64),
                 "rested": self.rest.counts[None],
             },
             "values": {"rejected_steps": np.array(self.rejected_steps)},
@@ -271,9 +261,9 @@ class Fluid:
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
-        self._through.host()[:] = snapshot["sums"]["through"]
-        self._limited.host()[:] = snapshot["sums"]["limited"]
-        for pair in (self._buffers[0], self._through, self._limited):
+        self.tiling.through.host()[:] = snapshot["sums"]["through"]
+        self.tiling.limited.host()[:] = snapshot["sums"]["limited"]
+        for pair in (self._buffers[0], self.tiling.through, self.tiling.limited):
             pair.changed()
         self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
         self.rejected_steps, self._signal = int(snapshot["values"]["rejected_steps"]), None
@@ -281,8 +271,7 @@ class Fluid:
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells that a stage computes."""
-        cells = self.tiles[:, [kernels.NX, kernels.NY, kernels.NZ]].prod(axis=1) * ~self.rest.settled
-        return np.bincount(self.tiles[:, kernels.BLOCK], cells, self.blocks.local_count)
+        return np.bincount(self.tiling.block, self.tiling.cells * ~self.rest.settled, self.blocks.local_count)
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""
@@ -291,7 +280,7 @@ class Fluid:
     def limited_faces(self) -> int:
         """Collective. How many faces had their flux limited so far, over all stages; those at the high sides of the
         domain are not counted."""
-        return int(self.blocks.communicator.concatenate(self._limited.host()).sum())
+        return int(self.blocks.communicator.concatenate(self.tiling.limited.host()).sum())
 
     def share_at_rest(self) -> float:
         """Collective. The part of all tile stages in which the tile was at rest."""
@@ -319,17 +308,17 @@ class Fluid:
         return sums * self._cell_volume()
 
     def leave(self, volume: np.ndarray) -> None:
-        """Book all that the cells hold in this `volume` (local blocks, Z, Y, X) as having left the domain."""
-        _, first = np.unique(self.tiles[:, kernels.BLOCK], return_index=True)
-        self._through.host()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
-        self._through.changed()
+        """All that the cells hold in this `volume` (local blocks, Z, Y, X) counts as having left the domain."""
+        _, first = np.unique(self.tiling.block, return_index=True)
+        self.tiling.through.host()[first, 1] += self._contents(volume)[:, 0] / self._cell_volume()
+        self.tiling.through.changed()
 
     def left_domain(self) -> np.ndarray:
         """What has left through the domain's sides so far (conserved,); a wall's impulse is momentum that left."""
-        through = self._through.host()
+        through = self.tiling.through.host()
         signed = through[:, 1::2].sum(axis=1) - through[:, 0::2].sum(axis=1)
         sums = np.zeros((self.blocks.local_count, self.model.conserved))
-        np.add.at(sums, self.tiles[:, kernels.BLOCK], signed)
+        np.add.at(sums, self.tiling.block, signed)
         return self.blocks.sum(sums * self._cell_volume())
 
     def outputs(self, covered: np.ndarray | None = None, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -358,7 +347,7 @@ class Fluid:
         return fields
 
     def check(self, time: float, covered: np.ndarray | None = None) -> None:
-        """Raise Diverged with place, time and state when a cell of this rank, not `covered`, has no valid state."""
+        """Raise Diverged with position, time and state when a cell of this rank, not `covered`, has no valid state."""
         for block in range(self.blocks.local_count):
             with np.errstate(all="ignore"):
                 W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
@@ -368,7 +357,7 @@ class Fluid:
                 valid |= self.active(covered, block)
             if not valid.all():
                 z, y, x = np.argwhere(~valid)[0]
-                where = f"at t = {time:.6g} s in the cell at ({self._place(block, (z, y, x))}) m"
+                where = f"at t = {time:.6g} s in the cell at ({self._position(block, (z, y, x))}) m"
                 values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
                 state = ", ".join(f"{name} {value:.6g}" for name, value in values)
                 raise Diverged(f"the fluid has no valid state {where}: {state}")
@@ -383,7 +372,7 @@ class Fluid:
         """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""
         return field[(block, *self._inside(block))]
 
-    def _inside(self, block: int) -> tuple:
+    def _inside(self, block: int) -> tuple[Any, ...]:
         """Where the active cells of a local block are in what is stored of it."""
         n, g = self.blocks.extent[block][::-1], self.blocks.grid.ghosts[::-1]
         return (..., *(slice(a, a + b) for a, b in zip(g, n, strict=True)))

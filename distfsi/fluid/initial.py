@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
-from distfsi.fluid.kernels.stage import HALVINGS
+from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
 from distfsi.scene.description import Fluid, FluidState
 from distfsi.scene.shapes import cell_fractions, contains
@@ -23,9 +23,12 @@ class InitialState:
     for it.
     """
 
-    def __init__(self, fluid: Fluid, model):
+    def __init__(self, fluid: Fluid, model: FluidModel):
         self.fluid, self.model = fluid, model
         self._conserved, self._primitives = (model.formula(name) for name in ("conserved", "primitives"))
+        self._references, self._omegas = (
+            [model.formula(f"{name}_{k + 1}") for k in range(model.phases)] for name in ("reference", "grueneisen")
+        )
         if model.phases == 2:
             formulas = (six_equation.phase_energies, relaxation.phases_before, relaxation.relaxed_fraction_change)
             self._energies, self._before, self._change, self._range, self._halved = (
@@ -46,8 +49,8 @@ class InitialState:
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
             centers = blocks.cell_centers(block)[:dimensions]
-            active = (slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True))
-            cells = field[(block, slice(None), *active)]
+            active = [slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True)]
+            cells = field[block, :, active[0], active[1], active[2]]
             for region, state in zip(self.fluid.regions, states, strict=True):
                 new = state[:, None, None, None]
                 if region.shape is None:
@@ -78,15 +81,17 @@ class InitialState:
         lowest, U = min(self._pressure(state) for state in states), shares @ np.array(states)
         energies = shares @ np.array([self._energies(W) for W in primitives])
         fractions = (U[-1], 1.0 - U[-1])
-        references = [eos.evaluate(m / a)[0] for eos, m, a in zip(self.model.eos, U[:2], fractions, strict=True)]
+        densities = [m / a for m, a in zip(U[:2], fractions, strict=True)]
+        references = [reference(rho)[0] for reference, rho in zip(self._references, densities, strict=True)]
+        omegas = [omega(rho)[0] for omega, rho in zip(self._omegas, densities, strict=True)]
         excess = [
-            eos.omega * energy - a * (lowest - reference)
-            for eos, energy, a, reference in zip(self.model.eos, energies, fractions, references, strict=True)
+            omega * energy - a * (lowest - reference)
+            for omega, energy, a, reference in zip(omegas, energies, fractions, references, strict=True)
         ]
         phases = self._before(lowest, U[-1], 0.0, U[0], U[1], *references, *excess)
         change, settled = self._change(phases)
         if settled < 0.0:
-            low, high = self._range(U[-1])
+            low, high = self._range(phases)
             for _ in range(HALVINGS):
                 low, high = self._halved(phases, low, high)
             change = 0.5 * (low + high)
@@ -109,16 +114,20 @@ class InitialState:
     def _densities(self, state: FluidState) -> list[float]:
         other = 1 - state.phase
         known = next((r.state for r in self.fluid.regions if r.state.phase == other), None)
-        trace = state.density if known is None else self._on_isentrope(other, known, state.pressure)
+        alone = min(state.density, 0.5 * self.model.eos[other].maximum_density)
+        trace = alone if known is None else self._on_isentrope(other, known, state.pressure)
         return [state.density, trace] if state.phase == 0 else [trace, state.density]
 
     def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
         """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""
-        eos = self.model.eos[phase]
+        from scipy.integrate import solve_ivp
 
-        def slope(p, rho):
-            reference, gradient = eos.evaluate(rho[0])
-            return [1.0 / (gradient + (p - reference + eos.omega * p) / rho[0])]
+        reference_of, omega_of = self._references[phase], self._omegas[phase]
+
+        def slope(p: float, rho: np.ndarray) -> list[float]:
+            (reference, gradient), (omega, omega_slope) = reference_of(rho[0]), omega_of(rho[0])
+            weight = 1.0 + rho[0] * omega_slope / omega
+            return [1.0 / (gradient + (weight * (p - reference) + omega * p) / rho[0])]
 
         if pressure == known.pressure:
             return known.density

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from distfsi.device.emit import plain
 from distfsi.device.fold import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
-from distfsi.laws.fluid.jwl import Jwl
-from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
+from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, Scene
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
@@ -26,7 +26,8 @@ RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost l
     "van_leer": (reconstruction.muscl, limiters.van_leer, 2),
     "weno5": (reconstruction.weno5, limiters.van_leer, 3),
 }
-RIEMANN_SOLVERS = {  # bounding speeds, diffusion across contacts, viscosity along faces
+# bounding speeds, diffusion across contacts, viscosity along faces
+RIEMANN_SOLVERS: dict[str, tuple[Callable[..., Any], ...]] = {
     "hllc": (riemann.einfeldt_speeds, riemann.sharp, riemann.inviscid),
     "hll": (riemann.einfeldt_speeds, riemann.contact_diffusion, riemann.inviscid),
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
@@ -36,50 +37,24 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 
 @dataclass(frozen=True)
-class PhaseFormulas:
-    """p = reference(rho) + omega rho e of a phase, outside the kernels."""
-
-    eos: FluidEos
-
-    @property
-    def omega(self) -> float:
-        """Grueneisen coefficient."""
-        return self.eos.omega if isinstance(self.eos, Jwl) else self.eos.gamma - 1.0
-
-    @property
-    def closed_form(self) -> bool:
-        """Whether the reference pressure is constant."""
-        return not isinstance(self.eos, Jwl)
-
-    def evaluate(self, rho: float) -> tuple[float, float]:
-        """Reference pressure [Pa] and its slope with density."""
-        return self._reference(rho)
-
-    @cached_property
-    def _reference(self) -> Callable[[float], tuple[float, float]]:
-        bound = Bound.of(self.eos, "reference")
-        return plain(bound.function, bound.constants)
-
-
-@dataclass(frozen=True)
 class FluidModel:
-    """Everything the fluid's kernels are specialised with, and the meaning of its variables.
-
-    mirror: per variable the axis whose reflection changes its sign, -1 for none.
-    """
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables."""
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
-    eos: tuple[PhaseFormulas, ...]
+    eos: tuple[FluidEos, ...]
     dimensions: int
+    body_force: BodyForce
 
     @property
     def phases(self) -> int:
+        """How many materials there are."""
         return len(self.eos)
 
     @property
     def variables(self) -> int:
-        return self.constants["VARIABLES"]
+        """Stored fields per cell."""
+        return of_kind(int, self.constants["VARIABLES"])
 
     @property
     def conserved(self) -> int:
@@ -88,57 +63,60 @@ class FluidModel:
 
     @property
     def mirror(self) -> np.ndarray:
+        """(variables,) the axis whose reflection changes the sign of each, -1 for none."""
         axes = np.full(self.variables, -1, dtype=np.int64)
         axes[self.phases : self.phases + self.dimensions] = np.arange(self.dimensions)
         return axes
 
-    def formula(self, name: str):
+    def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        return plain(self.bindings[name].function, self.constants, self.bindings)
+        bound = self.bindings[name]
+        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
 
 
 def fluid_model(scene: Scene) -> FluidModel:
     """The formulas and constants of the scene's fluid."""
-    fluid: Fluid = scene.fluid
+    fluid = present(scene.fluid)
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
-    eos = tuple(PhaseFormulas(phase.eos) for phase in fluid.phases)
+    eos = tuple(phase.eos for phase in fluid.phases)
     variables = phases + dimensions + 1 + (phases == 2)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
-    curved = reconstructed is reconstruction.weno5
+    asymmetric = reconstructed is reconstruction.weno5
+    body_force = BodyForce(scene.sources, dimensions)
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
         "FLUXES": variables + more_fluxes,
-        "GRAVITY": scene.gravity,
+        "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
-        "FINISHES": model is two_phase and not all(e.closed_form for e in eos),
+        "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
-        "SHARPENED": phases == 2 and (fluid.sharpening or curved),
-        "CURVED": curved,
-        "LOOKS_SIDEWAYS": dimensions > 1 and fluid.riemann == "adaptive",
+        "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
+        "ASYMMETRIC": asymmetric,
+        "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
-    } | {f"OMEGA_{k}": e.omega for k, e in enumerate(eos, 1)}
+    }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
-    if constants["FINISHES"]:
+    if constants["BISECTION_FALLBACK"]:
         bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
         bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
-    bindings |= {name: Bound(getattr(positivity, name)) for name in ("reserve", "is_admissible", "limited_flux")}
+    positive = ("limiter_indicator", "is_admissible", "limited_flux")
+    bindings |= {name: Bound(getattr(positivity, name)) for name in positive}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
     bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
     )
     bindings |= {name: Bound(function) for name, function in solver}
-    for k, phase in enumerate(fluid.phases):
-        owner = f"phase {k + 1}"
-        bindings[f"reference_{k + 1}"] = Bound.of(phase.eos, "reference", owner)
-        bindings[f"stored_reference_{k + 1}"] = _stored_reference(fluid, k, owner)
-    return FluidModel(constants, bindings, eos, dimensions)
+    for k, phase in enumerate(fluid.phases, 1):
+        bindings |= {f"{name}_{k}": Bound.of(phase.eos, name, f"phase {k}") for name in ("reference", "grueneisen")}
+        bindings[f"stored_reference_{k}"] = _stored_reference(fluid, k)
+    return FluidModel(constants, bindings, eos, dimensions, body_force)
 
 
 def ghost_layers(scene: Scene) -> int:
@@ -146,11 +124,12 @@ def ghost_layers(scene: Scene) -> int:
     return RECONSTRUCTIONS[scene.fluid.reconstruction if scene.fluid else "minmod"][2]
 
 
-def _stored_reference(fluid: Fluid, k: int, owner: str) -> Bound:
-    """In float32 the energies of a stiffened gas are counted from those of its first state without pressure."""
-    eos = fluid.phases[k].eos
-    first = next((region.state for region in fluid.regions if region.state.phase == k), None)
-    if fluid.precision == "float32" and isinstance(eos, StiffenedGas) and first is not None:
+def _stored_reference(fluid: Fluid, k: int) -> Bound:
+    """The reference to the energies of phase k that cells hold: in float32 those of the laws that can are counted from
+    the phase's first state without pressure."""
+    eos, owner = fluid.phases[k - 1].eos, f"phase {k}"
+    first = next((region.state for region in fluid.regions if region.state.phase == k - 1), None)
+    if fluid.precision == "float32" and hasattr(eos, "shifted_reference") and first is not None:
         bound = Bound.of(eos, "shifted_reference", owner)
         return replace(bound, constants={**bound.constants, "REST_DENSITY": first.density})
     return Bound.of(eos, "reference", owner)

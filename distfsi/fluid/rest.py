@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from distfsi.mesh.blocks import Blocks
@@ -26,7 +28,7 @@ class Rest:
     counts  tile stages so far: [at rest, all]
     """
 
-    def __init__(self, blocks: Blocks, first: np.ndarray, size: tuple[int, ...]):
+    def __init__(self, blocks: Blocks, first: np.ndarray, size: Sequence[int]):
         """`first` (tiles, 3): first cell of each tile in the grid; `size` (3,): cells of a whole tile."""
         self.stages = np.zeros(len(first) + 1, dtype=np.int64)
         self.calm = np.zeros(len(first), dtype=bool)
@@ -39,7 +41,7 @@ class Rest:
 
     def end_stage(self) -> None:
         """Count the tiles that have rested."""
-        self.counts += [np.count_nonzero(self.stages), len(self.calm)]
+        self.counts += np.array([np.count_nonzero(self.stages), len(self.calm)])
 
     def wake(self, tiles: np.ndarray | slice = np.s_[:]) -> None:
         """Something else than a stage has written into `tiles` (by default all)."""
@@ -51,25 +53,25 @@ class Rest:
         return self.stages[:-1] >= SETTLED
 
 
-def tile_sources(blocks: Blocks, first: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+def tile_sources(blocks: Blocks, first: np.ndarray, size: Sequence[int]) -> np.ndarray:
     """Numbers (tiles, k) of the tiles from which the cells and ghosts of each tile come; -1 for what is not a tile of
     this rank. Arguments as for Rest."""
-    places, sources = zip(*(_along(blocks, axis, first[:, axis], size[axis]) for axis in range(3)), strict=True)
+    positions, sources = zip(*(_along(blocks, axis, first[:, axis], size[axis]) for axis in range(3)), strict=True)
     number = np.full([len(source) + 1 for source in sources], -1)  # one more: index -1 leads to -1
-    number[places] = np.arange(len(first))
-    x, y, z = (source[place] for source, place in zip(sources, places, strict=True))
+    number[positions] = np.arange(len(first))
+    x, y, z = (source[position] for source, position in zip(sources, positions, strict=True))
     found = number[x[:, :, None, None], y[:, None, :, None], z[:, None, None, :]]
     return found.reshape(len(first), int(np.prod(found.shape[1:])))  # -1 would fail on a rank without tiles
 
 
 def _along(blocks: Blocks, axis: int, first: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Along one axis: the place of each tile, and for each place those (places, k) that its cells come from."""
+    """Along one axis: the position of each tile, and of each position those (positions, k) that its cells come from."""
     cells, length, ghosts = blocks.grid.cells[axis], blocks.block_cells[axis], blocks.grid.ghosts[axis]
     starts = [s for block in range(0, cells, length) for s in range(block, min(block + length, cells), size)]
     edges = np.array([*starts, cells])
-    place = np.repeat(np.arange(len(starts)), np.diff(edges))
+    position = np.repeat(np.arange(len(starts)), np.diff(edges))
     found = [source_cell(cell, cells, blocks.grid.boundaries[axis]) for cell in range(-ghosts, cells + ghosts)]
-    source = np.array([place[cell] if inflow < 0 else -1 for cell, _, inflow in found])
+    source = np.array([position[cell] if inflow < 0 else -1 for cell, _, inflow in found])
     layers = np.arange(ghosts)
     read = np.hstack([edges[:-1, None] + layers, edges[:-1, None] + ghosts, edges[1:, None] + ghosts + layers])
-    return place[first], np.unique(source[read], axis=1)
+    return position[first], np.unique(source[read], axis=1)

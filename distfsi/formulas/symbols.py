@@ -23,9 +23,11 @@ def chosen(name: str, meaning: str):
 
 
 DIMENSIONS = Symbol("number of space dimensions, 1 to 3")
-LEAST_ALONE = Symbol("open part of a cell with which its fluid stands alone where it finds no neighbour to join")
+MINIMUM_ISOLATED = Symbol(
+    "minimum isolated volume fraction: with more a cell stands alone where it has no merge target"
+)
 LANES = Symbol("how many items of a list a thread of the device computes side by side")
-KICKS = Symbol("values that a cell gives to the particles around it, the velocity first")
+TRANSFERRED = Symbol("transfer components: values that a cell gives to the particles around it, the velocity first")
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 
@@ -34,28 +36,30 @@ VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the vol
 FLUXES = Symbol(
     "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
 )
-GRAVITY = Symbol("body force per mass, one component per dimension [m/s2]")
+BODY_FORCE = Symbol("body force per mass, one component per dimension [m/s2], the mean over the step")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
-OMEGA_1 = Symbol("Grueneisen coefficient of phase 1: p = reference(rho) + omega rho e")
-OMEGA_2 = Symbol("Grueneisen coefficient of phase 2")
-CLOSED_FORM = Symbol("whether both phases have constant reference pressures, so that relaxation is a quadratic")
+REST_DENSITY = Symbol("density at which energies that are counted from rest vanish with the pressure [kg/m3]")
+CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas, to the root of a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
-FINISHES = Symbol("whether relaxation may need more than its fixed number of steps")
+BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed number of fits: then bisection")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
-CURVED = Symbol("whether primitives rise by different amounts on the two sides of a cell's mean")
-LOOKS_SIDEWAYS = Symbol("whether the flux of a face depends on pressures beside its two cells")
+ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
+TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+grueneisen_1 = chosen("grueneisen_1", "phase 1: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
+grueneisen_2 = chosen("grueneisen_2", "phase 2: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
 stored_reference_1 = chosen(
     "stored_reference_1", "as reference_1, to the energy that is stored: p = reference + omega rho e"
 )
 stored_reference_2 = chosen("stored_reference_2", "as reference_2, to the energy that is stored")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
 reconstructed = chosen(
-    "reconstructed", "cells around and with one -> rise from its low face to its mean, on to its high face"
+    "reconstructed",
+    "cells around and with one -> increments from its low face to its mean, from there to its high face",
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
 primitives = chosen("primitives", "conserved state -> primitive state")
@@ -65,12 +69,14 @@ bounding_speeds = chosen("bounding_speeds", "rho, u, c of both sides -> slowest 
 contact_jump_diffusion = chosen("contact_jump_diffusion", "wave speeds -> flux per jump across a contact [m/s]")
 slip_viscosity = chosen("slip_viscosity", "impedances, pressure jump, rho c^2 -> momentum flux per slip [kg/(m2 s)]")
 state_behind_wave = chosen("state_behind_wave", "primitive state, wave and face speeds -> all transported densities")
-reserve = chosen("reserve", "cell means, flux, sound speed, rate -> negative where the flux may need limiting")
+limiter_indicator = chosen(
+    "limiter_indicator", "cell means, flux, sound speed, rate -> negative where the flux may need limiting"
+)
 is_admissible = chosen("is_admissible", "cell means, flux, rate -> whether the flux alone leaves both cells valid")
 limited_flux = chosen("limited_flux", "cell means, flux, pressure jump, rate -> a flux that leaves both cells valid")
 updated = chosen("updated", "the state after a Runge-Kutta stage")
 before_relaxation = chosen("before_relaxation", "as updated -> where both phases stand, transport's change of a1")
-range_of_change = chosen("range_of_change", "volume fraction -> least and largest change by relaxation")
+range_of_change = chosen("range_of_change", "where both phases stand -> least and largest change of a1 by relaxation")
 halved_range = chosen("halved_range", "where both phases stand, range of changes -> the half with one pressure")
 fraction_after = chosen("fraction_after", "state before the step, change in the stage -> volume fraction")
 bulk_modulus = chosen("bulk_modulus", "primitive state -> rho c^2 [Pa], positive where the state is admissible")

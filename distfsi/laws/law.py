@@ -22,14 +22,18 @@ class Entry:
 
     meaning  in words
     unit     SI, "1" for a pure number; None: of what is no quantity, the type of the field says what it is
+    vector   whether it is one number per dimension
     limits   by name, "above", "at_least", "below", "at_most", in SI
     default  of the input, or NEEDED
+    key      in the input, where it is not the field's name
     """
 
     meaning: str
     unit: str | None
     limits: Mapping[str, float]
     default: object
+    vector: bool = False
+    key: str | None = None
 
 
 def quantity(unit: str, meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -42,24 +46,58 @@ def number(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     return quantity("1", meaning, default=default, **limits)
 
 
+def vector(unit: str, meaning: str, *, default: object = NEEDED, key: str | None = None) -> Any:
+    """A field that has a number in this unit for each dimension; `key` in the input, if that is not its name."""
+    return field(metadata={"entry": Entry(meaning, unit, {}, default, vector=True, key=key)})
+
+
 def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
     """A field that is no quantity: a whole number, or a record of its own."""
     return field(metadata={"entry": Entry(meaning, None, limits, default)})
 
 
+@dataclass(frozen=True)
 class Law:
-    """A law of any kind; `folder` in laws/ holds those of its kind."""
+    """A law of any kind; `folder` of the package holds those of its kind.
+
+    partner  word of the other law that a body needs with this one: a solid's EOS with a strength, or the reverse
+    """
 
     folder: ClassVar[str]
+    partner: ClassVar[str | None] = None
 
     def check(self) -> None:
         """Raise ValueError, in words for the user, where fields do not go together."""
 
 
 class FluidEos(Law):
-    """The pressure of a fluid."""
+    """The pressure of a fluid: p = reference(rho) + omega(rho) rho e, e [J/kg] counted from where the law likes.
 
-    folder = "fluid"
+    A law may also have shifted_reference(rho), for float32: the reference to energies counted from that at REST_DENSITY
+    and without pressure.
+
+    closed_form  whether phases relax along the hyperbola of fluid/formulas/relaxation.py; else it is fitted
+    """
+
+    folder = "laws/fluid"
+    closed_form: ClassVar[bool] = False
+
+    def reference(self, rho: float) -> tuple[float, float]:
+        """A formula for kernels: the pressure without energy [Pa], and its slope with density [m2/s2]."""
+        raise NotImplementedError
+
+    def grueneisen(self, rho: float) -> tuple[float, float]:
+        """A formula for kernels: the coefficient omega, and its slope with density [m3/kg]."""
+        raise NotImplementedError
+
+    def cold_curve(self, rho: float) -> tuple[float, float]:
+        """Pressure [Pa] and energy [J/kg] of the coldest state, for checks of the input."""
+        raise NotImplementedError
+
+    @property
+    def maximum_density(self) -> float:
+        """No state of the fluid is as dense [kg/m3]."""
+        return inf
 
 
 # ---- solids ----------------------------------------------------------------------------------------------------------
@@ -152,16 +190,23 @@ class SolidEos(Law):
     """The pressure of a solid.
 
     columns  what each particle remembers
-    needs    the word of the strength model without which it means nothing
     """
 
-    folder = "solid/eos"
+    folder = "laws/solid/eos"
     columns: ClassVar[tuple[Column, ...]] = ()
-    needs: ClassVar[str] = ""
 
     def reference_sound_speed(self, density):
         """Of the bulk [m/s], at rest at that `density` [kg/m3]."""
         raise NotImplementedError
+
+    def rest_bulk_modulus(self, density: float) -> float:
+        """Bulk modulus [Pa] at rest, where the material has this density [kg/m3]; for checks of the input."""
+        return float(density * self.reference_sound_speed(density) ** 2)
+
+    def behind_shock(self, u: float) -> tuple[float, float]:
+        """By how much sound is faster [m/s] behind a shock of particle velocity u, and the volume there over that in
+        front of it, as far as it is known."""
+        return 0.0, 1.0
 
     def respond(self, density, energy, rest: Rest, memory: EosMemory):
         """Pressure [Pa], isentropic bulk modulus [Pa], compaction of `Trial`; then all that is remembered.
@@ -180,12 +225,10 @@ class Strength(Law):
     """How a solid resists a change of its shape. A law with shear strength has a field `shear_modulus` [Pa].
 
     columns  what each particle remembers
-    needs    the word of the equation of state without which it means nothing
     """
 
-    folder = "solid/strength"
+    folder = "laws/solid/strength"
     columns: ClassVar[tuple[Column, ...]] = ()
-    needs: ClassVar[str] = ""
     shear_modulus = 0.0
 
     def flow_stress_at_rest(self):
@@ -217,7 +260,7 @@ class Failure(Law):
     columns  what each particle remembers
     """
 
-    folder = "solid/failure"
+    folder = "laws/solid/failure"
     columns: ClassVar[tuple[Column, ...]]
 
     def respond(self, load: Load, dt, width, memory: FailureMemory):
@@ -227,3 +270,19 @@ class Failure(Law):
 
 PLASTIC_STRAIN = Column("plastic_strain", "1", "equivalent plastic strain")
 DAMAGE = Column("damage", "1", "share of the stress that is no longer carried, of the pressure in tension only")
+
+
+class Source(Law):
+    """What accelerates everything alike: `acceleration` [m/s2], one component per dimension, times a share of it that
+    may depend on time. A step takes the mean over itself, so that a free body gains the integral to round-off.
+
+    steady  whether the share is the same at all times
+    """
+
+    folder = "laws/sources"
+    steady: ClassVar[bool] = False
+    acceleration: tuple[float, ...]
+
+    def share(self, start: float, end: float) -> float:
+        """The mean of the share over the time from `start` to `end` [s], which may be the same."""
+        raise NotImplementedError

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pkgutil
 from dataclasses import fields
-from functools import cache
 from importlib import import_module
 
 from distfsi.laws.law import Failure, Law, SolidEos, Strength
@@ -15,10 +14,9 @@ def word_of(law: type[Law]) -> str:
     return law.__module__.rpartition(".")[2]
 
 
-@cache
 def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
     """The laws in the folder of a kind, those with the fewest fields first."""
-    package = import_module(f"distfsi.laws.{kind.folder.replace('/', '.')}")
+    package = import_module(f"distfsi.{kind.folder.replace('/', '.')}")
     modules = [import_module(f"{package.__name__}.{each.name}") for each in pkgutil.iter_modules(package.__path__)]
     found = [law for module in modules for law in vars(module).values() if _is_law_of(law, kind, module.__name__)]
     return tuple(sorted(found, key=lambda law: (len(fields(law)), word_of(law))))
@@ -28,7 +26,6 @@ def _is_law_of(value: object, kind: type[Law], module: str) -> bool:
     return isinstance(value, type) and issubclass(value, kind) and value.__module__ == module
 
 
-@cache
 def column_units() -> dict[str, str]:
     """The units of what particles remember for any law of solids, but those of pure numbers."""
     laws = (law for kind in (SolidEos, Strength, Failure) for law in laws_of(kind))

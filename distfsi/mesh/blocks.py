@@ -1,4 +1,4 @@
-"""The grid of cells and its cut into blocks: their order, their owners, their places in memory.
+"""The grid of cells and its cut into blocks: their order, their owners, where they lie in memory.
 
 Index axes are x, y, z in this order everywhere except in array shapes, where x is last and fastest.
 """
@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from distfsi.device.interface import Device
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.curve import deal, morton_keys
+from distfsi.mesh.kernels.grid import BlockGrid, BlockTable
 
 GHOSTS = 2  # layers of ghost cells on each side of every used axis, where nothing asks for more
 
@@ -68,7 +70,7 @@ class Blocks:
     block_cells     cells of a whole block along x, y, z
     along           blocks along x, y, z
     count           number of all blocks
-    coordinates     (count, 3) place of each block among the blocks
+    coordinates     (count, 3) index of each block among the blocks, along each axis
     curve_index     (along x, along y, along z) the inverse of `coordinates`
     owners          (count,) rank of each block; ascending
     first           curve index of this rank's first block
@@ -104,6 +106,17 @@ class Blocks:
         self.origin = origin[self.first : end]
         self.extent = extent[self.first : end]
         self.shape = tuple(n + 2 * g for n, g in zip(self.block_cells[::-1], grid.ghosts[::-1], strict=True))
+
+    def grid_on(self, device: Device) -> BlockGrid:
+        """What kernels of a device know of the grid and of this rank's blocks."""
+        steps = (1, self.shape[2], self.shape[2] * self.shape[1])
+        known = (self.shape, steps, self.grid.lower, self.grid.spacing, self.grid.cells, self.origin, self.extent)
+        return BlockGrid(*(device.array(np.array(values)) for values in known))
+
+    def table_on(self, device: Device) -> BlockTable:
+        """The same of which cells all blocks have."""
+        known = (self.block_cells, self.curve_index)
+        return BlockTable(*(device.array(np.array(values)) for values in known), self.first)
 
     def allocate(self, variables: int, dtype: type = np.float64) -> np.ndarray:
         """A field of zeros (local_count, variables, Z, Y, X)."""

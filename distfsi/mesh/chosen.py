@@ -17,7 +17,7 @@ from distfsi.mesh.rows import Rows
 class Choice:
     """The cells of some regions in flat lists of the device, and those that are chosen among them.
 
-    rows     (n,) the places of the chosen among all, on the device
+    rows     (n,) the indices of the chosen among all, on the device
     columns  (n,) each: of the chosen cells, on the device
     """
 
@@ -87,8 +87,8 @@ class ChosenGhosts:
         if exchanged:
             column, (to, _) = 0, self._into.columns
             for flat, parity in given:
-                place = (parity.shape[0], self._cells, arrived, stride, column, flat)
-                self._device.run(self._kernels.unpack_cells, to.shape[0], to, *place)
+                target = (parity.shape[0], self._cells, arrived, stride, column, flat)
+                self._device.run(self._kernels.unpack_cells, to.shape[0], to, *target)
                 column += parity.shape[0]
 
     def _transfer(self, given: list[tuple[Any, Any]], stride: int) -> Any:
@@ -98,8 +98,8 @@ class ChosenGhosts:
         def pack(packed: Any) -> None:
             column = 0
             for flat, parity in given:
-                place = (*self._out.columns, parity, self._cells, flat, stride, column, packed)
-                device.run(self._kernels.pack_cells, route.leaving, *place)
+                source = (*self._out.columns, parity, self._cells, flat, stride, column, packed)
+                device.run(self._kernels.pack_cells, route.leaving, *source)
                 column += parity.shape[0]
 
         arrived, self._staged = route.carry(device, stride, given[0][0].dtype, pack)  # the device may still read it

@@ -45,7 +45,7 @@ class Communicator:
         """Wait for all ranks."""
         self.world.Barrier()
 
-    def broadcast(self, value: object) -> object:
+    def broadcast(self, value: Any) -> Any:
         """The (pickled) value of rank 0, on every rank."""
         return self.world.bcast(value)
 
@@ -101,7 +101,7 @@ class Communicator:
         self.world.Allreduce(values, largest, MPI.MAX)
         return largest
 
-    def write_at(self, path: str, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
+    def write_at(self, path: Path, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
         """Write this rank's C-contiguous `arrays` (maybe none) at its byte `offsets` into the existing file `path`.
 
         The data is on disk when this returns. Raises OSError on all ranks when one of them cannot open or write.

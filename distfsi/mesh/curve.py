@@ -6,7 +6,7 @@ import numpy as np
 
 
 def morton_keys(coordinates: np.ndarray) -> np.ndarray:
-    """Places (n,) int64 along the Morton (Z-order) curve of integer `coordinates` (n, 3) in [0, 2^21)."""
+    """Positions (n,) int64 along the Morton (Z-order) curve of integer `coordinates` (n, 3) in [0, 2^21)."""
     keys = np.zeros(len(coordinates), dtype=np.int64)
     for bit in range(int(coordinates.max(initial=0)).bit_length()):
         for axis in range(3):

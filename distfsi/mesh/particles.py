@@ -30,9 +30,7 @@ class ParticleExchange:
         particles."""
         self.blocks, self.device, self.kernels = blocks, device, kernels
         self.rows = Rows(device, kernels)
-        grid = blocks.grid
-        numbers = (grid.lower, grid.spacing, grid.cells, blocks.block_cells, blocks.curve_index)
-        self._grid = [device.array(np.array(values)) for values in numbers]
+        self._grid = blocks.grid_on(device), blocks.table_on(device)
         self._owners = device.array(blocks.owners)
         self._key: Key | None = None
         self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -102,20 +100,20 @@ class ParticleExchange:
         own, device = len(id), self.device
         image_reach = reach if image_reach is None else image_reach
         planes = self.planes(image_reach, mirrors)
-        border, asked = self._border(position, reach, image_reach, planes), self._bonded(id, bonded)
-        chosen = np.unique(np.concatenate([border, *asked.values(), self._with_images(id, bonded)]))
+        border, requested = self._border(position, reach, image_reach, planes), self._bonded(id, bonded)
+        chosen = np.unique(np.concatenate([border, *requested.values(), self._with_images(id, bonded)]))
         near = device.download(self.rows.taken(position, device.array(chosen)))
-        pairs = [rank * own + rows for rank, rows in asked.items()] + self._near(near, chosen, own, reach)
+        pairs = [rank * own + rows for rank, rows in requested.items()] + self._near(near, chosen, own, reach)
         ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
         arrived = route.brought({"position": near[np.searchsorted(chosen, rows)], "id": id[rows]})
-        place = np.concatenate([chosen, own + np.arange(len(arrived))])  # of what may have images
+        row = np.concatenate([chosen, own + np.arange(len(arrived))])  # of what may have images
         position, known = np.concatenate([near, arrived["position"]]), np.concatenate([id[chosen], arrived["id"]])
         mask, plane = self._mirrored(position, known, image_reach, planes, bonded)
         source, mask = images(mask)
         key = self._known_key(id, np.concatenate([arrived["id"] * IMAGES, known[source] * IMAGES + mask]))
         return GhostPlan(
-            own, len(key.host), key, self, route, device.array(rows), Images(device, place[source], mask, plane[source])
+            own, len(key.host), key, self, route, device.array(rows), Images(device, row[source], mask, plane[source])
         )
 
     def _border(self, position: Any, reach: float, image_reach: float, planes: list[tuple[int, float]]) -> np.ndarray:
@@ -123,12 +121,11 @@ class ParticleExchange:
         communicator = self.blocks.communicator
         if communicator.size == 1 and not planes:
             return np.empty(0, dtype=np.int64)
-        axes, places = (np.array([plane[k] for plane in planes], dtype) for k, dtype in ((0, np.int64), (1, float)))
+        axes, positions = (np.array([plane[k] for plane in planes], dtype) for k, dtype in ((0, np.int64), (1, float)))
         mark = self.device.empty(position.shape[0], np.int8)
-        self.device.run(
-            self.kernels.find_border, position.shape[0], position, reach, image_reach, self.device.array(axes),
-            self.device.array(places), *self._grid, self._owners, communicator.rank, mark,
-        )  # fmt: skip
+        mirrors = (self.device.array(axes), self.device.array(positions))
+        given = (position, reach, image_reach, *mirrors, *self._grid, self._owners, communicator.rank, mark)
+        self.device.run(self.kernels.find_border, position.shape[0], *given)
         return self.device.download(self.rows.marked(mark)[1])
 
     def _mirrored(
@@ -139,12 +136,12 @@ class ParticleExchange:
         planes: list[tuple[int, float]],
         bonded: np.ndarray | None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The axes (n,), as bits, along which particles have images, and the places (n, dimensions) of the planes."""
+        """The axes (n,), as bits, along which particles have images, and where (n, dimensions) [m] the planes are."""
         near, plane = np.zeros(len(id), dtype=np.int64), np.zeros_like(position)
-        for axis, place in planes:
-            close = np.abs(position[:, axis] - place) <= reach
+        for axis, at in planes:
+            close = np.abs(position[:, axis] - at) <= reach
             near[close] |= 1 << axis
-            plane[close, axis] = place
+            plane[close, axis] = at
         if bonded is not None:
             self._need_images(position, id, bonded, planes, near, plane)
         return near, plane
@@ -180,8 +177,8 @@ class ParticleExchange:
         rows = order[np.searchsorted(id, bonded // IMAGES, sorter=order)]
         np.bitwise_or.at(near, rows, bonded % IMAGES)
         for axis in {axis for axis, _ in planes}:
-            places = np.array([place for a, place in planes if a == axis])
-            nearest = places[np.argmin(np.abs(position[rows, axis][:, None] - places), axis=1)]
+            along = np.array([at for a, at in planes if a == axis])
+            nearest = along[np.argmin(np.abs(position[rows, axis][:, None] - along), axis=1)]
             plane[rows, axis] = nearest
 
     def _bonded(self, id: np.ndarray, bonded: np.ndarray | None) -> dict[int, np.ndarray]:
@@ -189,15 +186,15 @@ class ParticleExchange:
         communicator = self.blocks.communicator
         if bonded is None or communicator.size == 1:
             return {}
-        asked = communicator.allgather(np.unique(bonded // IMAGES))
+        requested = communicator.allgather(np.unique(bonded // IMAGES))
         others = (rank for rank in range(communicator.size) if rank != communicator.rank)
-        return {rank: np.flatnonzero(np.isin(id, asked[rank])) for rank in others}
+        return {rank: np.flatnonzero(np.isin(id, requested[rank])) for rank in others}
 
     def _near(self, position: np.ndarray, rows: np.ndarray, own: int, reach: float) -> list[np.ndarray]:
         """rank * own + row of the particles (n,) of the `rows` at the positions (n, dimensions) that are within `reach`
         of other ranks' blocks."""
         blocks = self.blocks
-        lowest, highest = (blocks.coordinates_of(place).T for place in (position - reach, position + reach))
+        lowest, highest = (blocks.coordinates_of(corner).T for corner in (position - reach, position + reach))
         pairs = [np.empty(0, dtype=np.int64)]
         for offset in product(*(range(n + 1) for n in (highest - lowest).max(axis=1, initial=0))):
             block = lowest + np.array(offset)[:, None]
@@ -208,15 +205,15 @@ class ParticleExchange:
         return pairs
 
     def planes(self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",)) -> list[tuple[int, float]]:
-        """(axis, place [m]) of the planes that mirror; raises InputError when two are less than twice `reach` apart."""
+        """(axis, position [m]) of the planes that mirror; raises InputError when two are closer than twice `reach`."""
         grid = self.blocks.grid
         planes = []
         for axis in range(grid.dimensions):
             ends = zip(grid.boundaries[axis], (grid.lower[axis], grid.upper[axis]), strict=True)
-            places = [place for kind, place in ends if kind in mirrors]
-            if len(places) == 2 and places[1] - places[0] <= 2 * reach:
-                raise InputError([f"domain: planes {places} m that mirror are less than {2 * reach} m apart"])
-            planes += [(axis, place) for place in places]
+            found = [at for kind, at in ends if kind in mirrors]
+            if len(found) == 2 and found[1] - found[0] <= 2 * reach:
+                raise InputError([f"domain: planes {found} m that mirror are less than {2 * reach} m apart"])
+            planes += [(axis, at) for at in found]
         return planes
 
 
@@ -235,7 +232,7 @@ class Key:
 
 
 class Images:
-    """On the device: the rows (count,) that images are of, the axes they are mirrored along, places of the planes."""
+    """On the device: the rows (count,) that images are of, the axes they are mirrored along, where the planes are."""
 
     def __init__(self, device: Device, source: np.ndarray, mask: np.ndarray, plane: np.ndarray) -> None:
         self.count = len(source)

@@ -16,7 +16,7 @@ import numpy as np
 
 from distfsi.mesh.blocks import Blocks
 
-# A run of cells along one axis of a block. `block` and `source` are places of blocks along the axis, starts are indices
+# A run of cells along one axis of a block. `block` and `source` count blocks along the axis, starts are indices
 # in their memory. ghost 0: the block's own active cells; flip 1: mirrored; inflow: the side whose constant it is or -1.
 RUN = np.dtype(
     {
@@ -56,22 +56,22 @@ def axis_runs(cells: int, block_cells: int, ghosts: int, kinds: tuple[str, str])
             start = first - begin + ghosts
             sources = [source_cell(index, cells, kinds) for index in range(first, first + ghosts)]
             for (source, flip, inflow), group in groupby(sources, lambda s: (s[0] // block_cells, *s[1:])):
-                for places in even_steps([cell % block_cells + ghosts for cell, *_ in group]):
-                    step = places[1] - places[0] if len(places) > 1 else 0
-                    runs.append((block, start, len(places), source, places[0], step, flip, inflow, 1))
-                    start += len(places)
+                for indices in even_steps([cell % block_cells + ghosts for cell, *_ in group]):
+                    step = indices[1] - indices[0] if len(indices) > 1 else 0
+                    runs.append((block, start, len(indices), source, indices[0], step, flip, inflow, 1))
+                    start += len(indices)
     return np.array(runs, dtype=RUN)
 
 
-def even_steps(places: list[int]) -> Iterator[list[int]]:
+def even_steps(indices: list[int]) -> Iterator[list[int]]:
     """Cut a list where its steps change."""
     first = 0
-    for n in range(2, len(places) + 1):
-        if n == len(places) or (n - first >= 2 and places[n] - places[n - 1] != places[first + 1] - places[first]):
-            yield places[first:n]
+    for n in range(2, len(indices) + 1):
+        if n == len(indices) or (n - first >= 2 and indices[n] - indices[n - 1] != indices[first + 1] - indices[first]):
+            yield indices[first:n]
             first = n
-    if first < len(places):
-        yield places[first:]
+    if first < len(indices):
+        yield indices[first:]
 
 
 def products(runs: list[np.ndarray], coordinates: np.ndarray, end: str) -> np.ndarray:
@@ -84,9 +84,9 @@ def products(runs: list[np.ndarray], coordinates: np.ndarray, end: str) -> np.nd
         first = np.searchsorted(run[end], wanted)
         number = np.searchsorted(run[end], wanted, side="right") - first
         repeat = np.repeat(np.arange(len(rows)), number)
-        place = np.arange(len(repeat)) - np.repeat(np.cumsum(number) - number, number)
+        nth = np.arange(len(repeat)) - np.repeat(np.cumsum(number) - number, number)
         rows = rows[repeat]
-        chosen = [other[repeat] for other in chosen] + [run[first[repeat] + place]]
+        chosen = [other[repeat] for other in chosen] + [run[first[repeat] + nth]]
     return np.stack(chosen, axis=1)
 
 
@@ -100,7 +100,7 @@ class Regions:
 
     @classmethod
     def of(cls, blocks: Blocks, end: str) -> Regions:
-        """The ghost regions that have this rank's blocks at `end`, in the order of (block, place in the block)."""
+        """The ghost regions that have this rank's blocks at `end`, in the order of (block, index in the block)."""
         grid = blocks.grid
         runs = [axis_runs(grid.cells[a], blocks.block_cells[a], grid.ghosts[a], grid.boundaries[a]) for a in range(3)]
         run = products(runs, blocks.coordinates[blocks.first : blocks.first + blocks.local_count], end)
@@ -124,12 +124,12 @@ class Regions:
         return self.run["length"].prod(axis=1)
 
     def table(self, destination: np.ndarray, source: np.ndarray, mirrored: bool = True) -> np.ndarray:
-        """The table of `kernels.regions.copy_regions` from the places of both ends."""
+        """The table of `kernels.regions.copy_regions` from the indices of both ends."""
         flips = self.flips if mirrored else np.zeros_like(self.block)
         return np.hstack([self.run["length"], flips[:, None], destination, source])
 
     def in_field(self, blocks: Blocks, variables: int, end: str) -> np.ndarray:
-        """Places (n, 5) of the `end` of each region in this rank's field."""
+        """Indices (n, 5) of the `end` of each region in this rank's field."""
         size_z, size_y, size_x = blocks.shape
         strides = np.array([1, size_x, size_x * size_y])
         cells = size_x * size_y * size_z
@@ -146,8 +146,8 @@ class Regions:
         region = np.repeat(np.arange(len(first)), self.volume)
         nth = np.arange(len(region)) - np.repeat(np.cumsum(self.volume) - self.volume, self.volume)
         row = nth // nx[region]
-        place = (nth % nx[region], row % ny[region], row // ny[region])
-        return first[region] + sum(n * step[region] for n, step in zip(place, steps, strict=True))
+        index = (nth % nx[region], row % ny[region], row // ny[region])
+        return first[region] + sum(n * step[region] for n, step in zip(index, steps, strict=True))
 
     @property
     def flips(self) -> np.ndarray:
@@ -155,13 +155,13 @@ class Regions:
         return self.run["flip"] @ (1, 2, 4)
 
     def in_message(self, variables: int) -> np.ndarray:
-        """Places (n, 5) in a buffer that holds the regions one after the other."""
+        """Indices (n, 5) in a buffer that holds the regions one after the other."""
         nx, ny, _ = self.run["length"].T
         volume = self.volume
         return np.column_stack([(np.cumsum(volume) - volume) * variables, volume, np.ones_like(nx), nx, nx * ny])
 
     def in_constants(self, variables: int) -> np.ndarray:
-        """Places (n, 5) in the inflow constants (3, 2, variables); where two inflows meet the lower axis counts."""
+        """Indices (n, 5) in the inflow constants (3, 2, variables); where two inflows meet the lower axis counts."""
         inflow = self.run["inflow"]
         axis = np.argmax(inflow >= 0, axis=1)
         first = (2 * axis + inflow[np.arange(len(axis)), axis]) * variables

@@ -20,20 +20,20 @@ class Rows:
         """`kernels`: the drivers of mesh/kernels/rows.py as built by the device."""
         self.device, self._kernels = device, kernels
 
-    def largest(self, values: Any, least: float) -> float:
-        """The largest of `values` (n,) and `least`; NaN if there is one."""
+    def largest(self, values: Any, floor: float) -> float:
+        """The largest of `values` (n,) and `floor`; NaN if there is one."""
         found = self.device.empty(chunks(values.shape[0]), values.dtype)
         self.reduce(self._kernels.find_largest, values.shape[0], values, found)
-        return np.max(self.device.download(found), initial=least)
+        return np.max(self.device.download(found), initial=floor)
 
-    def least(self, values: Any) -> tuple[float, int]:
-        """The least of `values` (n,) and its first place, n > 0; a NaN is less than anything."""
+    def minimum(self, values: Any) -> tuple[float, int]:
+        """The smallest of `values` (n,) and its first index, n > 0; a NaN is less than anything."""
         count = values.shape[0]
-        least, place = self.device.empty(chunks(count), values.dtype), self.device.empty(chunks(count), np.int64)
-        self.reduce(self._kernels.find_least, count, values, least, place)
-        values, places = self.device.download(least), self.device.download(place)
+        smallest, index = self.device.empty(chunks(count), values.dtype), self.device.empty(chunks(count), np.int64)
+        self.reduce(self._kernels.find_minimum, count, values, smallest, index)
+        values, indices = self.device.download(smallest), self.device.download(index)
         chunk = np.argmin(values)
-        return values[chunk], int(places[chunk])
+        return values[chunk], int(indices[chunk])
 
     def bounds(self, values: Any) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest of each column (k,) of `values` (n, k), without NaN: of no values inf and -inf."""
@@ -74,10 +74,8 @@ class Rows:
         width = int(np.prod(shape[1:]))
         taken, own = self.device.empty(shape, values.dtype), values.shape[0]
         others = self.device.empty(0, values.dtype) if others is None else others
-        self.device.run(
-            self._kernels.take_rows, shape[0], rows, own, width, values.reshape(-1), others.reshape(-1),
-            taken.reshape(-1),
-        )  # fmt: skip
+        flat = (values.reshape(-1), others.reshape(-1), taken.reshape(-1))
+        self.device.run(self._kernels.take_rows, shape[0], rows, own, width, *flat)
         return taken
 
 

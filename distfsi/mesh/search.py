@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from distfsi.device.interface import Device
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels import search as kernels
+from distfsi.mesh.kernels.search import Bins
 from distfsi.mesh.rows import Rows
 
 DRIVERS = (kernels.find_cells, kernels.fill_cells, kernels.order_cells, row_kernels.find_bounds)
-
-
-class SearchCells(NamedTuple):
-    """A window of the search grid, with an empty cell on each side; fields are in the order of the loops' arguments.
-
-    start    (cells + 1,): where the particles of each cell of the window begin in `order`
-    order    (n,): the particles, cell by cell, in the order of their keys
-    lower    corner of the grid [m]; size: side of its cells [m]
-    low      (D,) first search cell of the window with particles, counted from the corner
-    window   (D,) cells of the window, the empty ones included
-    strides  (3,) steps in `start` along each axis
-    """
-
-    start: Any
-    order: Any
-    lower: Any
-    size: float
-    low: Any
-    window: Any
-    strides: Any
 
 
 class CellSort:
@@ -42,14 +24,16 @@ class CellSort:
     strides  (3,) those of the last window, on the host
     """
 
-    def __init__(self, kernels: SimpleNamespace, device: Device, lower: np.ndarray, upper: np.ndarray):
+    def __init__(
+        self, kernels: SimpleNamespace, device: Device, lower: Sequence[float], upper: Sequence[float]
+    ) -> None:
         """`kernels` holds DRIVERS."""
         self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
         self._lower, self._upper = np.array(lower), np.array(upper)
         self._corner = device.array(self._lower)
         self.strides = np.ones(3, dtype=np.int64)
 
-    def sort(self, position: Any, key: Any, size: float) -> tuple[Any, SearchCells]:
+    def sort(self, position: Any, key: Any, size: float) -> tuple[Any, Bins]:
         """The search cell of each particle, and the cells of `size` [m]; `position` (n, D) [m], `key` (n,)."""
         device, kernels, count = self._device, self._kernels, position.shape[0]
         last = np.ceil((self._upper - self._lower) / size)
@@ -62,4 +46,4 @@ class CellSort:
         device.run(kernels.find_cells, count, position, self._corner, size, low, high, strides, cell)
         device.run_few(kernels.fill_cells, 1, cell, start, order)
         device.run(kernels.order_cells, start.shape[0] - 1, start, order, key)
-        return cell, SearchCells(start, order, self._corner, size, low, window, strides)
+        return cell, Bins(start, order, self._corner, size, low, window, strides)

@@ -124,11 +124,11 @@ def read_cells(path: Path) -> tuple[float, dict[str, np.ndarray], np.ndarray, np
 
 
 def read_layer(
-    path: Path, normal: int, place: float | None = None, names: Sequence[str] | None = None
+    path: Path, normal: int, position: float | None = None, names: Sequence[str] | None = None
 ) -> tuple[float, dict[str, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Time [s], fields (nv, nh) or (nv, nh, 3) and corners, low and high (3,) [m], of a layer of cells of a cells file.
 
-    It is the one that the plane normal to axis `normal` at `place` [m] (None: the middle) passes through; nh cells
+    It is the one that the plane normal to axis `normal` at `position` [m] (None: the middle) passes through; nh cells
     along the first of the other axes, nv along the second. Of the fields only `names` are read, by default all; of
     large layers only each so many cells, for more than LARGEST_LAYER along an axis are too fine to be seen. Raises
     ValueError when the plane passes by or there is nothing to cut, KeyError when there is no such field.
@@ -138,11 +138,11 @@ def read_layer(
         cells = np.maximum(root.attrs["WholeExtent"][1::2], 1)
         low, spacing = root.attrs["Origin"], root.attrs["Spacing"]
         dimensions = np.count_nonzero(root.attrs["WholeExtent"][1::2])
-        if place is not None and dimensions < 3:
+        if position is not None and dimensions < 3:
             raise ValueError("only three dimensions can be cut")
-        layer = cells[normal] // 2 if place is None else int(np.floor((place - low[normal]) / spacing[normal]))
+        layer = cells[normal] // 2 if position is None else int(np.floor((position - low[normal]) / spacing[normal]))
         if not 0 <= layer < cells[normal]:
-            raise ValueError(f"the plane at {place:g} m lies outside of the domain along {'xyz'[normal]}")
+            raise ValueError(f"the plane at {position:g} m lies outside of the domain along {'xyz'[normal]}")
         others = [axis for axis in (2, 1, 0) if axis != normal]
         steps = [-(-cells[axis] // LARGEST_LAYER) if cells[others].min() > 1 else 1 for axis in others]
         chosen = [slice(None, None, step) for step in steps]

@@ -15,7 +15,7 @@ AXES = "xyz"
 ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of a plane, horizontal and vertical, by its normal
 
 Extent = tuple[float, float, float, float]  # left, right, bottom, top [m]; bottom = top in one dimension
-Plane = tuple[int, float]  # axis that it is normal to, place on that axis [m]
+Plane = tuple[int, float]  # axis that it is normal to, position on that axis [m]
 
 
 @dataclass(frozen=True)
@@ -95,18 +95,18 @@ class Film:
                 yield self._with_cells(self._cells[number][1], particles, names)
             else:
                 time, columns = read_particles(particles)
-                normal, place = self._plane or (2, 0.5 * (self._box[0][2] + self._box[1][2]))
+                normal, at = self._plane or (2, 0.5 * (self._box[0][2] + self._box[1][2]))
                 axes = ACROSS[normal]
                 extent = tuple(float(corner[axis]) for axis in axes for corner in self._box)
-                yield Frame(time, extent, {}, *_near_plane(columns, normal, place), axes)
+                yield Frame(time, extent, {}, *_near_plane(columns, normal, at), axes)
 
     def _with_cells(self, cells: Path, particles: Path | None, names: Sequence[str] | None) -> Frame:
-        normal, place = self._plane or (axis_across(cells), None)
-        time, fields, (low, high) = read_layer(cells, normal, place, names)
+        normal, at = self._plane or (axis_across(cells), None)
+        time, fields, (low, high) = read_layer(cells, normal, at, names)
         axes = ACROSS[normal]
         extent = tuple(float(corner[axis]) for axis in axes for corner in (low, high))
-        place = 0.5 * (low[normal] + high[normal]) if place is None else place
-        near, distance = _near_plane(read_particles(particles)[1], normal, place) if particles else ({}, 0.0)
+        at = 0.5 * (low[normal] + high[normal]) if at is None else at
+        near, distance = _near_plane(read_particles(particles)[1], normal, at) if particles else ({}, 0.0)
         return Frame(time, extent, fields, near, distance, axes)
 
     def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
@@ -131,10 +131,8 @@ def telling_plane(cells: Path, particles: Path) -> Plane | None:
     extents = np.round((last - first) / (high - low).max(), 2)
     normal = sorted((2, 1, 0), key=lambda axis: extents[axis])[1]
     touches_low, touches_high = first < low + edge, last > high - edge
-    place = np.where(
-        touches_low & ~touches_high, low + 0.5 * edge, np.clip(0.5 * (first + last), low, high - 0.5 * edge)
-    )
-    return normal, float(place[normal])
+    at = np.where(touches_low & ~touches_high, low + 0.5 * edge, np.clip(0.5 * (first + last), low, high - 0.5 * edge))
+    return normal, float(at[normal])
 
 
 def load_frames(directory: Path, count: int) -> list[Frame]:
@@ -147,7 +145,7 @@ def load_frames(directory: Path, count: int) -> list[Frame]:
     return list(film.frames(chosen))
 
 
-def _near_plane(columns: Mapping[str, np.ndarray], normal: int, place: float) -> tuple[dict[str, np.ndarray], float]:
+def _near_plane(columns: Mapping[str, np.ndarray], normal: int, at: float) -> tuple[dict[str, np.ndarray], float]:
     """The particles within half their spacing of a plane, and their spacing: that of the sparser direction."""
     position = columns["position"]
     if len(position) < 2:
@@ -156,5 +154,5 @@ def _near_plane(columns: Mapping[str, np.ndarray], normal: int, place: float) ->
     # In a lattice a particle on the surface still has one neighbour more than there are dimensions.
     neighbours = min(np.count_nonzero(np.ptp(position, axis=0)) + 1, len(position) - 1)
     spacing = float(np.median(cKDTree(position).query(some, k=neighbours + 1)[0][:, -1]))
-    near = np.abs(position[:, normal] - place) <= 0.5 * spacing
+    near = np.abs(position[:, normal] - at) <= 0.5 * spacing
     return {name: column[near] for name, column in columns.items()}, spacing

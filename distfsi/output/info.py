@@ -1,4 +1,4 @@
-"""What an output directory holds, told from its files: `python -m distfsi info`."""
+"""What an output directory holds, told from its files: `distfsi info`."""
 
 from __future__ import annotations
 
@@ -50,6 +50,9 @@ def _journal(journal: dict) -> Iterator[Line]:
     yield "ended", WORDS[journal["status"]] + took
     if "message" in journal:
         yield from (("" if n else "because", line) for n, line in enumerate(journal["message"].splitlines()))
+    if total := sum(journal.get("seconds by part", {}).values()):
+        parts = sorted(journal["seconds by part"].items(), key=lambda part: -part[1])
+        yield "time in", ", ".join(f"{part} {100.0 * seconds / total:.0f} %" for part, seconds in parts)
     where = f"{journal['ranks']} rank(s) of {journal['threads per rank']} thread(s)"
     yield "run", f"{journal['started']}, distfsi {journal['distfsi']}, {where}"
 

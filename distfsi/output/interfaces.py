@@ -40,15 +40,24 @@ class Communicator(Protocol):
 class Grid(Protocol):
     """The cells of the domain; x, y, z in this order, one cell on unused axes."""
 
-    dimensions: int
-    cells: tuple[int, int, int]
-    lower: tuple[float, float, float]
-    spacing: tuple[float, float, float]
+    @property
+    def dimensions(self) -> int: ...
+
+    @property
+    def cells(self) -> tuple[int, int, int]: ...
+
+    @property
+    def lower(self) -> tuple[float, float, float]: ...
+
+    @property
+    def spacing(self) -> tuple[float, float, float]: ...
 
 
 class Blocks(Protocol):
     """The blocks that the domain is cut into."""
 
-    grid: Grid
+    @property
+    def grid(self) -> Grid: ...
+
     block_cells: tuple[int, int, int]
     origin: np.ndarray  # (own blocks, 3): global index x, y, z of a block's first cell

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time as clock
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -44,9 +45,12 @@ class Journal:
     A journal that cannot be written is no reason to end a run.
     """
 
-    def __init__(self, directory: Path, scene: Any, communicator: Communicator, threads: int):
+    def __init__(
+        self, directory: Path, scene: Any, communicator: Communicator, threads: int, seconds: Mapping[str, float]
+    ):
+        """`seconds`: what each part of the steps has taken, as it is known when the run ends."""
         self._path, self._writes = Path(directory) / NAME, communicator.rank == 0
-        self._started = clock.monotonic()
+        self._started, self._seconds = clock.monotonic(), seconds
         self._notes = {
             "title": scene.title,
             "end time [s]": scene.time.end,
@@ -64,6 +68,7 @@ class Journal:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _) -> None:
         status = "done" if kind is None else ENDINGS.get(kind, "failed")
         self._notes |= {"status": status, "seconds": round(clock.monotonic() - self._started, 1)}
+        self._notes["seconds by part"] = {part: round(seconds, 3) for part, seconds in self._seconds.items()}
         if error is not None:
             self._notes["message"] = str(error) if isinstance(error, DistfsiError) else f"{kind.__name__}: {error}"
         self._write()

@@ -37,7 +37,7 @@ class Colors:
 
 
 def values(columns: Mapping[str, np.ndarray], name: str, axes: int) -> np.ndarray:
-    """A field with one value per place, `axes` axes of them; of a vector its magnitude, also under the name "speed"."""
+    """A field with one value per cell or particle, in `axes` axes; of a vector its magnitude, also named "speed"."""
     array = columns["velocity" if name == "speed" and name not in columns else name]
     return array if array.ndim == axes else np.linalg.norm(array, axis=-1)
 
@@ -74,7 +74,7 @@ def summary_colors(frames: Sequence[Frame]) -> tuple[list[Colors], Colors | None
 
 @dataclass(frozen=True)
 class Sheet:
-    """Places of the maps of some fields (or of particles alone) at some times: side by side, or where domains are wide
+    """Layout of the maps of some fields (or of particles alone) at some times: side by side, or where domains are wide
     one below the other."""
 
     aspect: float
@@ -159,7 +159,7 @@ def draw_maps(
 def _draw_field(axes: Iterable[Axes], frames: Sequence[Frame], colors: Colors, length: float) -> None:
     for panel, frame in zip(axes, frames, strict=True):
         image = np.ma.masked_invalid(values(frame.cells, colors.name, 2) / colors.size)
-        extent = [place / length for place in frame.extent]
+        extent = [edge / length for edge in frame.extent]
         panel.imshow(image, origin="lower", extent=extent, norm=colors.map.norm, cmap=colors.map.cmap, aspect="auto")
 
 

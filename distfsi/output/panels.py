@@ -76,7 +76,7 @@ def _profile_names(frames: Sequence[Frame]) -> list[str]:
 
 
 def _curves(frame: Frame, name: str) -> Iterator[tuple[np.ndarray, np.ndarray, str]]:
-    """Places, values and line style of a field; of a vector its component along x."""
+    """Positions, values and line style of a field; of a vector its component along x."""
     if name in frame.cells:
         yield frame.cell_centers, _along_x(frame.cells[name][0]), "-"
     if name in frame.particles:
@@ -103,8 +103,8 @@ def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
         ("relative drift of totals", drifts),
         (f"time step [{step_unit}]", {"": step / step_size}),
     )
-    places = grid_of_panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.1), (1.0, 0.0))[0]
-    for axes, (title, curves) in zip(places, panels, strict=True):
+    panels_of_sheet = grid_of_panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.1), (1.0, 0.0))[0]
+    for axes, (title, curves) in zip(panels_of_sheet, panels, strict=True):
         for name, values in curves.items():
             style = "-" if np.count_nonzero(np.isfinite(values)) > 2 else ".-"
             axes.plot(time / size, values, style, label=re.sub(r"^drift | \[.*", "", name).replace("_", " "))
@@ -115,11 +115,11 @@ def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
 
 
 def _energies(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Energies of the parts; what the coupling makes or loses as one."""
+    """Energies of the parts; what the coupling creates as one."""
     names = [name for name in history if name.endswith("energy [J]") and not name.startswith("drift ")]
-    energies = {name: history[name] for name in names if not name.startswith("ledger ")}
-    ledger = [history[name] for name in names if name.startswith("ledger ")]
-    return energies | ({"made by the coupling": sum(ledger)} if ledger else {})
+    energies = {name: history[name] for name in names if not name.startswith("coupling ")}
+    created = [history[name] for name in names if name.startswith("coupling ")]
+    return energies | ({"created by the coupling": sum(created)} if created else {})
 
 
 def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -143,7 +143,7 @@ def draw_legend(axes: Axes, columns: int = 2) -> None:
     )
 
 
-# ---- places on the sheet ---------------------------------------------------------------------------------------------
+# ---- layout of the sheet ---------------------------------------------------------------------------------------------
 
 
 def grid_of_panels(
@@ -159,7 +159,7 @@ def grid_of_panels(
     left, right, below, above = margins
     panel_width = (width - left - right - (columns - 1) * gaps[0]) / columns
     panel_height = (height - below - above - (rows - 1) * gaps[1]) / rows
-    places = {
+    layout = {
         "left": left / width,
         "right": 1.0 - right / width,
         "bottom": below / height,
@@ -167,7 +167,7 @@ def grid_of_panels(
         "wspace": gaps[0] / panel_width,
         "hspace": gaps[1] / panel_height,
     }
-    return figure.subplots(rows, columns, squeeze=False, gridspec_kw=places, **shared)
+    return figure.subplots(rows, columns, squeeze=False, gridspec_kw=layout, **shared)
 
 
 def draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, label: str, side: str) -> None:
@@ -175,8 +175,8 @@ def draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, l
     width, height = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
     box = Bbox.union([panel.get_position() for panel in axes])
     if side == "right":
-        place = (box.x1 + 0.25 / width, box.y0, 0.15 / width, box.height)
-        figure.colorbar(colors, cax=figure.add_axes(place), label=label)
+        edges = (box.x1 + 0.25 / width, box.y0, 0.15 / width, box.height)
+        figure.colorbar(colors, cax=figure.add_axes(edges), label=label)
     else:
-        place = (box.x0, box.y0 - (XLABEL + 0.15) / height, box.width, 0.15 / height)
-        figure.colorbar(colors, cax=figure.add_axes(place), label=label, orientation="horizontal")
+        edges = (box.x0, box.y0 - (XLABEL + 0.15) / height, box.width, 0.15 / height)
+        figure.colorbar(colors, cax=figure.add_axes(edges), label=label, orientation="horizontal")

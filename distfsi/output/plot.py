@@ -1,4 +1,4 @@
-"""Pictures of a run from its files: `python -m distfsi plot`."""
+"""Pictures of a run from its files: `distfsi plot`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def plot(
 
     field: of the cells (default pressure); particles: field that colors the particles (default plastic strain or, where
     nothing has yielded, speed); time: only the frame nearest to it [s]; every: each so many frames; slice: plane of
-    three dimensions, (axis, place [m]), by default the one that shows most of the bodies; movie: the frames as an
+    three dimensions, (axis, position [m]), by default the one that shows most of the bodies; movie: the frames as an
     animated GIF, too. Runs along a line are drawn with all their fields. Raises InputError where the directory has no
     such thing.
     """
@@ -134,7 +134,7 @@ def _particle_colors(film: Film, numbers: Sequence[int], names: list[str], wante
         return None
     if wanted is not None and wanted not in (*present, "speed"):
         raise InputError([f"--particles {wanted}: no such field; there are speed, {', '.join(present)}"])
-    usual = ["plastic_strain", "speed"] if "plastic_strain" in present else ["speed"]
+    usual = [name for name in ("plastic_strain", "speed") if name in (*present, "speed")]
     for name in [wanted] if wanted else usual:
         extremes = [_extremes(values(frame.particles, name, 1)) for frame in film.frames(numbers, names)]
         if wanted or any(values.any() for values in extremes):

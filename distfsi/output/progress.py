@@ -25,6 +25,14 @@ class Progress:
         self._interval = SECONDS_BETWEEN_REDRAWS if self._bar else SECONDS_BETWEEN_LINES
         self._reported_step = 0
         self._reported_at: float | None = None
+        self._compiled_at = -self._interval
+
+    def compiling(self, number: int) -> None:
+        """Report that kernel number `number` of those that this run has to compile is next."""
+        now = clock.monotonic()
+        if self._shown and now - self._compiled_at >= self._interval:
+            self._compiled_at = now
+            self._show(f"compiling kernel {number}, once for this kind of scene")
 
     def update(self, step: int, time: float, dt: float, limited_by: str, extra: str = "") -> None:
         """Report step number `step`, which reached `time` [s] with `dt` [s]; `limited_by` says what set `dt`."""
@@ -73,7 +81,7 @@ class Progress:
         bar.start()
         return bar
 
-    def _show(self, line: str, time: float) -> None:
+    def _show(self, line: str, time: float | None = None) -> None:
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=time, description=line)
         else:

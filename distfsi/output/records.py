@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +22,15 @@ class Records:
     """Field files, history and restart files of a run; at a restart those up to `origin` are continued.
 
     What a run that died has written after the restart file is removed first, so that in the end the files are those of
-    a run that was never interrupted. How evenly several ranks share the work is in a file of its own, since no result
-    depends on it: `balance.csv`.
+    a run that was never interrupted. Where the time goes and how evenly several ranks share the work is in files of
+    their own, since no result depends on it: `performance.csv`, `balance.csv`.
 
     restart  path of the last restart file, or None
     """
 
-    def __init__(self, simulation, budget, storage: Storage, origin: Origin | None):
-        """Collective. `budget` gives the history its columns and rows. Raises OutputError on all ranks."""
+    def __init__(self, simulation, budget, performance, storage: Storage, origin: Origin | None):
+        """Collective. `budget` gives the history its columns and rows, `performance` those of the file of its name.
+        Raises OutputError on all ranks."""
         scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator
         directory = Path(scene.output.directory)
         time, step = (origin.time, origin.step) if origin else (None, None)
@@ -36,7 +38,9 @@ class Records:
         self._restarts = RestartWriter(directory, scene, blocks, communicator, storage, step)
         self._fields = FieldWriter(directory, blocks, communicator, storage, time)
         self._history = History(directory / "history.csv", budget.columns, communicator, step)
-        self._simulation, self._accounts, self._directory = simulation, budget, directory
+        self._performance = History(directory / "performance.csv", performance.columns, communicator, step)
+        self._simulation, self._directory = simulation, directory
+        self._budget, self._timing = budget, performance
         self._fields_due, self._frame = Every(scene.output.fields_every), 0
         self._written_at = -1.0
         self.restart = origin.path if origin else None
@@ -46,10 +50,12 @@ class Records:
     def write(self, always: bool = False) -> None:
         """Write what is due at the simulation's time, or fields and history `always`."""
         simulation = self._simulation
-        if self._fields_due.due(simulation.time) or always:
-            self.write_fields()
-        if simulation.steps % simulation.scene.output.history_every == 0 or always:
-            self._history.append(self._accounts.row(simulation))
+        with simulation.timers("output"):
+            if self._fields_due.due(simulation.time) or always:
+                self.write_fields()
+            if simulation.steps % simulation.scene.output.history_every == 0 or always:
+                self._history.append(self._budget.row(simulation))
+                self._performance.extend([self._timing.row(simulation.steps, simulation.time)])
 
     def write_fields(self) -> None:
         """Write the fields, if they are not those written last."""
@@ -58,9 +64,11 @@ class Records:
             self._fields.write(self._frame, simulation.time, *simulation.outputs())
             self._frame, self._written_at = self._frame + 1, simulation.time
 
-    def write_restart(self, snapshots: Mapping[str, Snapshot]) -> Path:
-        """Write a restart file; its path."""
-        self.restart = self._restarts.write(self._simulation.steps, snapshots)
+    def write_restart(self, kept: Mapping[str, Any]) -> Path:
+        """Write a restart file with the snapshots of all that is kept; its path."""
+        with self._simulation.timers("output"):
+            snapshots = {name: part.snapshot() for name, part in kept.items()}
+            self.restart = self._restarts.write(self._simulation.steps, snapshots)
         return self.restart
 
     def write_balance(self, imbalance: float, changes_hands: bool) -> None:

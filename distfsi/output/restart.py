@@ -28,7 +28,7 @@ FORMAT = 2
 KEPT = 2  # restart files in an output directory
 # What may change at a restart: as it likes, or so that the user is told.
 FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit")
-TOLD = ("time.end", "time.maximum_steps", "time.cfl")
+REPORTED = ("time.end", "time.maximum_steps", "time.cfl")
 
 Snapshot = Mapping[str, Mapping[str, np.ndarray]]
 
@@ -142,15 +142,15 @@ class Restart:
         Raises InputError with one line per key that differs and may not.
         """
         now = describe(scene)
-        told = {
+        changed = {
             key: f"{key}: {now.get(key, 'absent')}; was {self._scene.get(key, 'absent')} in {self.path}"
             for key in [*now, *(self._scene.keys() - now.keys())]
             if now.get(key) != self._scene.get(key) and not any(f"{key}.".startswith(f"{free}.") for free in FREE)
         }
-        faults = [text for key, text in told.items() if key not in TOLD]
+        faults = [text for key, text in changed.items() if key not in REPORTED]
         if faults:
-            raise InputError([*faults, f"at a restart only these may change: {', '.join([*FREE, *TOLD])}"])
-        return list(told.values())
+            raise InputError([*faults, f"at a restart only these may change: {', '.join([*FREE, *REPORTED])}"])
+        return list(changed.values())
 
     def restore(self, parts: Mapping[str, Any], blocks: Blocks, communicator: Communicator) -> None:
         """Collective. Bring back the parts that were kept; the others stay as they are.

@@ -87,15 +87,15 @@ def _unusable(directory: Path) -> str:
 
 
 class MpiIo:
-    """Rank 0 lays down the file, and all ranks write raw values to their final places in it through MPI-IO."""
+    """Rank 0 lays down the file, and all ranks write raw values to their final positions in it through MPI-IO."""
 
     def __init__(self, communicator: Communicator):
         self._communicator = communicator
 
     def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
-        places = on_root(self._communicator, path, lambda: _create(path, lay_down))
+        layouts = on_root(self._communicator, path, lambda: _create(path, lay_down))
         pieces = [piece for piece in pieces if piece[2].size]
-        offsets = [places[name].offset(start) for name, start, _ in pieces]
+        offsets = [layouts[name].offset(start) for name, start, _ in pieces]
         with naming(path):
             self._communicator.write_at(path, offsets, [np.ascontiguousarray(values) for _, _, values in pieces])
 
@@ -107,10 +107,10 @@ class Gather:
         self._communicator = communicator
 
     def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
-        places = on_root(self._communicator, path, lambda: _create(path, lay_down))
+        layouts = on_root(self._communicator, path, lambda: _create(path, lay_down))
         for rank in range(self._communicator.size):
             received = self._communicator.bring(pieces, rank)
-            on_root(self._communicator, path, lambda received=received: _add(path, places, received))
+            on_root(self._communicator, path, lambda received=received: _add(path, layouts, received))
 
 
 class ParallelHdf5:
@@ -120,7 +120,7 @@ class ParallelHdf5:
         self._communicator = communicator
 
     def write(self, path: Path, lay_down: LayDown, pieces: Sequence[Piece]) -> None:
-        names = on_root(self._communicator, path, lambda: _reserve(path, lay_down))
+        names = on_root(self._communicator, path, lambda: _allocate(path, lay_down))
 
         def write() -> None:
             with h5py.File(path, "r+", driver="mpio", comm=self._communicator.world) as file:
@@ -139,13 +139,13 @@ class ParallelHdf5:
 def create_dataset(
     group: h5py.Group, name: str, shape: Sequence[int], dtype: np.dtype, chunks: Sequence[int] | None = None
 ) -> h5py.Dataset:
-    """A dataset whose place in the file is settled at once and is not filled."""
+    """A dataset whose position in the file is settled at once and is not filled."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     return group.create_dataset(name, shape, dtype, chunks=chunks, fill_time="never", dcpl=layout)
 
 
-class Places:
+class Layout:
     """Where in its file a dataset of `create_dataset` has its values."""
 
     def __init__(self, dataset: h5py.Dataset):
@@ -171,12 +171,12 @@ class Places:
         return int(self._bytes[tuple(chunk)] + np.ravel_multi_index(inside, self._chunk) * self._itemsize)
 
 
-def _create(path: Path, lay_down: LayDown) -> dict[str, Places]:
+def _create(path: Path, lay_down: LayDown) -> dict[str, Layout]:
     with h5py.File(path, "w") as file:
-        return {name: Places(dataset) for name, dataset in lay_down(file).items()}
+        return {name: Layout(dataset) for name, dataset in lay_down(file).items()}
 
 
-def _reserve(path: Path, lay_down: LayDown) -> dict[str, str]:
+def _allocate(path: Path, lay_down: LayDown) -> dict[str, str]:
     """Create a file that has all the space it needs; where its datasets are.
 
     HDF5's MPI driver may notice nothing on a disk that runs full, and old versions crash when they close a file there.
@@ -190,12 +190,12 @@ def _reserve(path: Path, lay_down: LayDown) -> dict[str, str]:
     return names
 
 
-def _add(path: Path, places: Mapping[str, Places], pieces: Sequence[Piece]) -> None:
-    """Write raw values to their places."""
+def _add(path: Path, layouts: Mapping[str, Layout], pieces: Sequence[Piece]) -> None:
+    """Write raw values to their positions."""
     with path.open("r+b") as file:
         for name, start, values in pieces:
             if values.size:
-                file.seek(places[name].offset(start))
+                file.seek(layouts[name].offset(start))
                 file.write(np.ascontiguousarray(values))
 
 

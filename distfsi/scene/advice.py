@@ -13,7 +13,7 @@ from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, sta
 AXES, ENDS = "xyz", ("low", "high")
 BEST_SPACING = 0.5  # of a fluid cell
 FEWEST_PARTICLES = 4  # through a body's thickness
-MOST_CELLS = 500  # across the smallest thing
+MAXIMUM_CELLS = 500  # across the smallest thing
 UNREACHED = 0.25  # of the domain's length that no wave reaches
 
 
@@ -57,7 +57,7 @@ def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
 def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
-    if any(scene.gravity):
+    if scene.sources:
         return
     if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"
@@ -69,8 +69,8 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
         for side, gap in enumerate((low - domain.lower[axis], domain.upper[axis] - high)):
             rest = gap - reach
             if rest > UNREACHED * length and domain.boundaries[axis][side] != "periodic":
-                place = f"the {ENDS[side]} {AXES[axis]} end"
-                nearest = f"no wave comes nearer to {place} than {rest:.3g} m before the run is over"
+                end = f"the {ENDS[side]} {AXES[axis]} end"
+                nearest = f"no wave comes nearer to {end} than {rest:.3g} m before the run is over"
                 yield f"{nearest}; a smaller domain will do"
 
 
@@ -122,11 +122,11 @@ def _excess_cells(scene: Scene) -> Iterator[str]:
     extents = [size for shape in _shapes(scene) if (size := _extent(shape)) is not None]
     if scene.fluid and extents:
         across = min(extents) / max(scene.domain.spacing)
-        if across > MOST_CELLS:
+        if across > MAXIMUM_CELLS:
             yield f"even the smallest thing in the scene is {across:.0f} cells across; fewer may do"
     for body in _bodies(scene):
         thick = thickness(body, scene.domain)
-        if thick is not None and thick / body.spacing > MOST_CELLS:
+        if thick is not None and thick / body.spacing > MAXIMUM_CELLS:
             yield f"body '{body.name}' is {thick / body.spacing:.0f} particles thick; fewer may do"
 
 
@@ -179,9 +179,9 @@ def _turns_around(scene: Scene, axis: int) -> bool:
 
 
 def _velocities(scene: Scene) -> list[tuple[float, ...]]:
-    """Velocities of the flow and of bodies, and gravity."""
+    """Velocities of the flow and of bodies, and accelerations."""
     flows = [state.velocity for state in states(scene.fluid)] if scene.fluid else []
-    return [*flows, *(body.velocity for body in _bodies(scene)), scene.gravity]
+    return [*flows, *(body.velocity for body in _bodies(scene)), *(source.acceleration for source in scene.sources)]
 
 
 def _shapes(scene: Scene) -> list[Shape]:

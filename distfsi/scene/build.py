@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from distfsi.scene import description, schema
+from distfsi.laws.law import Source
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene.description import (
     Body,
     Coupling,
     Domain,
     Fluid,
     FluidState,
-    Gauge,
     Output,
     Peaks,
     Performance,
@@ -20,11 +20,11 @@ from distfsi.scene.description import (
     Solid,
     Time,
 )
+from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
-    GaugeInput,
     OutputInput,
     PerformanceInput,
     SolidInput,
@@ -38,7 +38,6 @@ TILE_CELLS = ((512,), (128, 32), (64, 8, 8))
 AXES = ("x", "y", "z")
 SIDES = ("low", "high")
 ARRIVAL = 0.01  # of the ambient pressure
-EACH_STEP = 0.0
 
 
 def build_domain(given: DomainInput) -> Domain:
@@ -133,23 +132,10 @@ def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:
     )
 
 
-def build_gauges(given: Mapping[str, GaugeInput], end: float, bodies: Sequence[str]) -> tuple[Gauge, ...]:
-    """The gauges of a run until `end` [s]; bodies by their place in `bodies`."""
-    return tuple(_gauge(name, gauge, end, bodies) for name, gauge in given.items())
-
-
-def _gauge(name: str, given: GaugeInput, end: float, bodies: Sequence[str]) -> Gauge:
-    match given:
-        case schema.PointGauge(position=position, every=every):
-            return description.PointGauge(name, position, every or EACH_STEP)
-        case schema.LineGauge(start=start, end=stop, points=points, every=every):
-            return description.LineGauge(name, start, stop, points, every or end / 100)
-        case schema.PlaneGauge(axis=axis, position=position, every=every):
-            return description.PlaneGauge(name, AXES.index(axis), position, every or end / 100)
-        case schema.ParticleGauge(body=body, position=position, every=every):
-            return description.ParticleGauge(name, bodies.index(body), position, every or EACH_STEP)
-        case schema.BodyGauge(body=body, every=every):
-            return description.BodyGauge(name, bodies.index(body), every or EACH_STEP)
+def build_sources(gravity: tuple[float, ...] | None, given: Mapping[str, SourceInput]) -> tuple[Source, ...]:
+    """What accelerates everything: gravity, and the sources by name."""
+    everywhere = (Gravity(gravity),) if gravity and any(gravity) else ()
+    return (*everywhere, *(source.build() for source in given.values()))
 
 
 def build_coupling(given: CouplingInput) -> Coupling:

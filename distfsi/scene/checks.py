@@ -8,8 +8,8 @@ import re
 from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.description import (
@@ -26,27 +26,22 @@ from distfsi.scene.description import (
     Tube,
 )
 from distfsi.scene.faults import Fault, Path, one_of
+from distfsi.scene.law_tables import GaugeInput
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
-    BodyGauge,
     CouplingInput,
     DomainInput,
     FluidInput,
-    GaugeInput,
-    LineGauge,
     OutputInput,
-    ParticleGauge,
     PerformanceInput,
-    PlaneGauge,
-    PointGauge,
     Sections,
 )
 from distfsi.scene.shapes import bounding_box, contains
-from distfsi.scene.thermodynamics import cold_curve, sound_speed_squared
+from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
-MOST_CELLS, MOST_PARTICLES = 1e11, 1e8
+MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
 
 
@@ -88,8 +83,8 @@ def check_domain(given: DomainInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(("domain", "upper"), f"must be greater than lower along {AXES[axis]}")
         if domain.boundaries[axis].count("periodic") == 1:
             yield Fault(path, "one end is periodic; expected both or none")
-    if (count := math.prod(domain.cells)) > MOST_CELLS:
-        yield Fault(("domain", "cells"), f"{count:.1e} cells; at most {MOST_CELLS:.0e}")
+    if (count := math.prod(domain.cells)) > MAXIMUM_CELLS:
+        yield Fault(("domain", "cells"), f"{count:.1e} cells; at most {MAXIMUM_CELLS:.0e}")
 
 
 def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
@@ -116,13 +111,17 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
     """A mixture needs two phases within their bounds, a state a real sound speed."""
     if state.volume_fraction is not None:
-        least = fluid.minimum_volume_fraction
+        limit = fluid.minimum_volume_fraction
         if len(fluid.phases) < 2:
             yield Fault((*path, "volume_fraction"), "needs two phases")
-        elif not least <= state.volume_fraction <= 1.0 - least:
-            yield Fault((*path, "volume_fraction"), f"expected {least:g} to 1 - {least:g} (`minimum_volume_fraction`)")
+        elif not limit <= state.volume_fraction <= 1.0 - limit:
+            yield Fault((*path, "volume_fraction"), f"expected {limit:g} to 1 - {limit:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
-    cold_pressure, cold_energy, _ = cold_curve(phase.eos, state.density)
+    if state.density >= phase.eos.maximum_density:
+        text = f"too high: '{phase.name}' has states below {phase.eos.maximum_density:.6g} kg/m3 only"
+        yield Fault((*path, "density"), text)
+        return
+    cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
@@ -158,8 +157,8 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield from faults
             continue
         yield from _check_extent((*path, "shape"), body, domain)
-        if (count := _number_of_particles(body, domain)) > MOST_PARTICLES:
-            text = f"{body.spacing:.6g} m makes about {count:.1e} particles; at most {MOST_PARTICLES:.0e}"
+        if (count := _number_of_particles(body, domain)) > MAXIMUM_PARTICLES:
+            text = f"{body.spacing:.6g} m makes about {count:.1e} particles; at most {MAXIMUM_PARTICLES:.0e}"
             yield Fault((*path, "spacing"), text)
             continue
         positions, _ = pack(body, domain.lower, domain.upper)
@@ -186,10 +185,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
-    for key, law, other in (("eos", body.eos, body.strength), ("strength", body.strength, body.eos)):
-        if law.needs not in ("", word_of(type(other))):
-            wanted = "strength" if key == "eos" else "eos"
-            yield Fault((*path, key), f"'{word_of(type(law))}' needs the {wanted} '{law.needs}'")
+    if (pair := _lone_partner(body)) is not None:
+        yield Fault((*path, "strength"), "'{}' and the eos '{}' need each other".format(*pair))
+
+
+def _lone_partner(body: Body) -> tuple[str, str] | None:
+    """Words of a strength and an EOS that need each other, if the body has but one of them."""
+    strength, eos = word_of(type(body.strength)), word_of(type(body.eos))
+    pairs = ((body.eos.partner or strength, eos), (strength, body.strength.partner or eos))
+    return next((pair for pair in pairs if pair != (strength, eos)), None)
 
 
 def _cut_off_axis(shape: Shape, domain: Domain) -> bool:
@@ -230,6 +234,8 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
 
 
 def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) -> bool:
+    from scipy.spatial import cKDTree
+
     (a, points_of_a), (b, points_of_b) = first, second
     if contains(a.shape, points_of_b).any() or contains(b.shape, points_of_a).any():
         return True
@@ -264,34 +270,22 @@ def check_gauges(
     given: Mapping[str, GaugeInput], present: Container[str], domain: Domain, solid: Solid | None
 ) -> Iterator[Fault]:
     """Gauges have something to measure, inside the domain."""
-    for name, gauge in given.items():
-        path = ("gauges", name)
+    bodies = [body.name for body in solid.bodies] if solid else []
+    for name, table in given.items():
+        path, gauge = ("gauges", name), table.build()
         if not FILE_NAME.fullmatch(name):
             yield Fault(path, "is no name for a file; expected letters, digits, - and _")
-        material = "solid" if isinstance(gauge, ParticleGauge | BodyGauge) else "fluid"
-        if material not in present:
-            yield Fault((*path, "kind"), f"'{gauge.kind}' needs a {material}")
-        elif material == "fluid":
-            yield from _check_place(path, gauge, domain)
-        elif solid is not None and gauge.body not in (bodies := [body.name for body in solid.bodies]):
-            yield Fault((*path, "body"), f"'{gauge.body}' is no body" + one_of(bodies, gauge.body))
+        if gauge.needs not in present:
+            yield Fault((*path, "kind"), f"'{table.kind}' needs a {gauge.needs}")
+        elif gauge.needs == "fluid" or solid is not None:
+            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _outside(gauge, domain):
+                yield Fault((*path, key), text + (one_of(bodies, getattr(gauge, key)) if key == "body" else ""))
 
 
-def _check_place(path: Path, gauge: PointGauge | LineGauge | PlaneGauge, domain: Domain) -> Iterator[Fault]:
-    ends = dict(zip(AXES, zip(domain.lower, domain.upper, strict=True), strict=False))
-    match gauge:
-        case PointGauge(position=position):
-            places = {"position": dict(zip(AXES, position, strict=False))}
-        case LineGauge(start=start, end=end):
-            places = {"from": dict(zip(AXES, start, strict=False)), "to": dict(zip(AXES, end, strict=False))}
-        case PlaneGauge(axis=axis, position=position):
-            if domain.dimensions == 1 or axis not in ends:
-                yield Fault((*path, "axis"), f"'{axis}' in a domain of {domain.dimensions} dimension(s)")
-                return
-            places = {"position": {axis: position}}
-    for key, place in places.items():
-        if not all(ends[axis][0] <= x <= ends[axis][1] for axis, x in place.items()):
-            yield Fault((*path, key), "lies outside the domain")
+def _outside(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
+    for key, position in gauge.positions().items():
+        if not all(domain.lower[axis] <= x <= domain.upper[axis] for axis, x in position.items()):
+            yield key, "lies outside the domain"
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

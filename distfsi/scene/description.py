@@ -5,10 +5,12 @@ Vectors have one entry per dimension of the domain. Sides are (axis, 0 = low end
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Strength
+from distfsi.gauges import Gauge
+from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -234,61 +236,6 @@ class Output:
     stop_file: str = "stop"
 
 
-# ---- gauges: each samples `every` so many seconds, 0: at each step --------------------------------------------------
-
-
-@dataclass(frozen=True)
-class PointGauge:
-    """The fluid at `position` [m]."""
-
-    name: str
-    position: tuple[float, ...]
-    every: float
-
-
-@dataclass(frozen=True)
-class LineGauge:
-    """The fluid at so many equidistant `points` from `start` to `end` [m], both among them."""
-
-    name: str
-    start: tuple[float, ...]
-    end: tuple[float, ...]
-    points: int
-    every: float
-
-
-@dataclass(frozen=True)
-class PlaneGauge:
-    """The layer of cells that holds the plane normal to `axis` at `position` [m]."""
-
-    name: str
-    axis: int
-    position: float
-    every: float
-
-
-@dataclass(frozen=True)
-class ParticleGauge:
-    """The particle of `body` (an index) that is nearest to `position` [m] at the start, wherever it goes."""
-
-    name: str
-    body: int
-    position: tuple[float, ...]
-    every: float
-
-
-@dataclass(frozen=True)
-class BodyGauge:
-    """The whole of `body` (an index): its motion and the force of the fluid on it."""
-
-    name: str
-    body: int
-    every: float
-
-
-Gauge = PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge
-
-
 @dataclass(frozen=True)
 class Coupling:
     """How fluid and solid meet; the solid makes up to so many `sub_steps` in a step of the fluid.
@@ -317,10 +264,10 @@ class Scene:
     title: str
     domain: Domain
     time: Time
-    gravity: tuple[float, ...]
     fluid: Fluid | None
     solid: Solid | None
     output: Output
     performance: Performance
-    gauges: tuple[Gauge, ...] = ()
+    gauges: Mapping[str, Gauge] = field(default_factory=dict)
     coupling: Coupling = Coupling()
+    sources: tuple[Source, ...] = ()

@@ -58,10 +58,10 @@ class Locations:
         if not fault.path:
             return f"{self.file}: {fault.text}"
         line = self.line(fault.path)
-        place = f" (line {line})" if line else ""
+        where = f" (line {line})" if line else ""
         if self.overridden.intersection(_prefixes(fault.path)):
-            place = " (--set)"
-        return f"{self.file}: {dotted(fault.path)}{place}: {fault.text}"
+            where = " (--set)"
+        return f"{self.file}: {dotted(fault.path)}{where}: {fault.text}"
 
 
 def _prefixes(path: Path) -> list[Path]:

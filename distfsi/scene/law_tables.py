@@ -1,16 +1,18 @@
-"""Tables of the input for the laws of materials, made from the fields of their dataclasses."""
+"""Tables of the input for laws and gauges, made from the fields of their dataclasses."""
 
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from types import NoneType
-from typing import Annotated, Any, Literal, Union, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.gauges import Gauge
+from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
-from distfsi.scene.values import Mirror, quantity
+from distfsi.narrowing import present
+from distfsi.scene.values import Mirror, quantity, vector
 
 LIMITS = {"above": "gt", "at_least": "ge", "below": "lt", "at_most": "le"}  # pydantic's words
 
@@ -27,28 +29,34 @@ class LawTable(Mirror):
 def table_of(law: type[Law], key: str | None = None, word: str | None = None) -> type[LawTable]:
     """The table of a law; where there are several `key` = `word` chooses this one."""
     types = get_type_hints(law)
-    chosen = {key: (Literal[word], ...)} if key else {}
     given = [each for each in fields(law) if each.init]
-    entries = {each.name: _field(types[each.name], each.metadata["entry"]) for each in given}
-    summary = law.__doc__.partition("\n\n")[0]
-    table = create_model(law.__name__, __base__=LawTable, __doc__=summary, __module__=__name__, **chosen, **entries)
-    table.describes, table.word = law, key
+    entries: dict[str, Any] = {key: (Literal[word], ...)} if key else {}
+    entries |= {each.name: _field(types[each.name], each.metadata["entry"]) for each in given}
+    summary = (law.__doc__ or "").partition("\n\n")[0]
+    table = create_model(law.__name__, __base__=LawTable, __doc__=summary, __module__=__name__, **entries)
+    table.describes, table.word = law, key or ""
     return table
 
 
 def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
     """Type and description of one key."""
-    options = set(get_args(type_)) - {NoneType} or {type_}
-    (kind,) = options
-    limits = {LIMITS[name]: limit for name, limit in given.limits.items()}
+    whole = given.vector or get_origin(type_) is Literal
+    options = {type_} if whole else set(get_args(type_)) - {NoneType} or {type_}
+    kind: Any = next(iter(options))
+    limits: dict[str, Any] = {LIMITS[name]: limit for name, limit in given.limits.items()}
+    found: Any
     if is_dataclass(kind):
-        found = table_of(kind)
+        found = table_of(cast(type[Law], kind))
+    elif given.vector:
+        found = vector(present(given.unit))
     elif given.unit is not None:
         found = quantity(given.unit, **limits)
+    elif whole:
+        found = kind
     else:
         found = Annotated[kind, Field(strict=True, **limits)]
     default = ... if given.default is NEEDED else given.default
-    return (found | None if kind is not type_ else found), Field(default, description=given.meaning)
+    return (found | None if kind is not type_ else found), Field(default, alias=given.key, description=given.meaning)
 
 
 def choice(kind: type[Law], key: str = "kind") -> Any:
@@ -64,7 +72,9 @@ def _word_as_table(value: Any) -> Any:
 PhaseInput = choice(FluidEos, "eos")
 SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
-_StrengthTable = choice(Strength)
+SourceInput = choice(Source)
+GaugeInput: Any = choice(Gauge)
+_StrengthTable: Any = choice(Strength)
 StrengthInput = Annotated[
     _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])
 ]

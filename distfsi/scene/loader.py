@@ -80,12 +80,12 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         title=sections.title or stem,
         domain=domain,
         time=build.build_time(sections.time),
-        gravity=sections.domain.gravity or (0.0,) * dimensions,
+        sources=build.build_sources(sections.domain.gravity, sections.sources),
         fluid=fluid,
         solid=solid,
         output=build.build_output(sections.output, stem, fluid),
         performance=build.build_performance(sections.performance, dimensions),
         coupling=build.build_coupling(sections.coupling),
-        gauges=build.build_gauges(sections.gauges, sections.time.end, list(sections.solid.bodies if solid else ())),
+        gauges={name: gauge.build() for name, gauge in sections.gauges.items()},
     )
     return scene, faults

@@ -1,5 +1,5 @@
 """The reference of the input, written from the schema: `python -m distfsi.scene.reference > docs/input.md`; and the
-schema itself for editors: `python -m distfsi schema > docs/distfsi.schema.json`."""
+schema itself for editors: `distfsi schema > docs/distfsi.schema.json`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Strength
+from distfsi.gauges import Gauge
+from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.loader import schema
 
@@ -50,9 +51,10 @@ SECTIONS = {
     "`strength` of a body": _names(Strength),
     "`failure` of a body": (*_names(Failure), "Scatter"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
+    "`[sources.NAME]`": _names(Source),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
-    "`[gauges.NAME]`": ("PointGauge", "LineGauge", "PlaneGauge", "ParticleGauge", "BodyGauge"),
+    "`[gauges.NAME]`": _names(Gauge),
     "`[coupling]`": ("CouplingInput",),
     "`[performance]`": ("PerformanceInput",),
 }

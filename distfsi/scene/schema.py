@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.law_tables import FailureInput, PhaseInput, SolidEosInput, StrengthInput
+from distfsi.scene.law_tables import FailureInput, GaugeInput, PhaseInput, SolidEosInput, SourceInput, StrengthInput
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
     Acceleration,
@@ -216,62 +216,7 @@ class OutputInput(Table):
     )
 
 
-# ---- gauges ----------------------------------------------------------------------------------------------------------
-
-Interval = quantity("s", gt=0.0) | None
-EACH_STEP = "time between samples; default each step"
-HUNDREDTH = "time between samples; default a hundredth of the run"
-
-
-class PointGauge(Table):
-    """The fluid at a point: pressure, density, velocity and, with two phases, volume fraction in gauges/NAME.csv.
-
-    Values are linear between cell centers; covered cells do not count, and in a covered cell there is no value (nan).
-    """
-
-    kind: Literal["point"]
-    position: Position = Field(description="where")
-    every: Interval = Field(None, description=EACH_STEP)
-
-
-class LineGauge(Table):
-    """The fluid at equidistant points of a line: one row per point and time, values as for a point."""
-
-    kind: Literal["line"]
-    start: Position = Field(alias="from", description="first point")
-    end: Position = Field(alias="to", description="last point")
-    points: Annotated[int, Field(strict=True, ge=2)] = Field(description="number of points, the ends included")
-    every: Interval = Field(None, description=HUNDREDTH)
-
-
-class PlaneGauge(Table):
-    """The layer of cells that a plane passes through, as field files in gauges/NAME/; 2D and 3D."""
-
-    kind: Literal["plane"]
-    axis: Literal["x", "y", "z"] = Field(description="axis that the plane is normal to")
-    position: quantity("m") = Field(description="where the plane cuts the axis")
-    every: Interval = Field(None, description=HUNDREDTH)
-
-
-class ParticleGauge(Table):
-    """A particle of a body, wherever it goes: all its fields. Velocities are those of half a step before."""
-
-    kind: Literal["particle"]
-    body: str = Field(description="name of the body")
-    position: Position = Field(description="the particle nearest to it at the start")
-    every: Interval = Field(None, description=EACH_STEP)
-
-
-class BodyGauge(Table):
-    """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
-    mass, momentum."""
-
-    kind: Literal["body"]
-    body: str = Field(description="name of the body")
-    every: Interval = Field(None, description=EACH_STEP)
-
-
-GaugeInput = Annotated[PointGauge | LineGauge | PlaneGauge | ParticleGauge | BodyGauge, Field(discriminator="kind")]
+# ---- how parts meet, and what only changes speed ---------------------------------------------------------------------
 
 
 class CouplingInput(Table):
@@ -314,6 +259,7 @@ class Sections(Table):
     time: TimeInput | None = None
     fluid: FluidInput | None = None
     solid: SolidInput | None = None
+    sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     coupling: CouplingInput = CouplingInput()

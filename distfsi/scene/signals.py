@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
@@ -128,7 +127,7 @@ def fastest_signal(scene: Scene, layout: Layout) -> float:
 def moving_share(scene: Scene, layout: Layout) -> float:
     """Share of the fluid's tiles that compute, as the mean over the time of the run: a tile of one state rests until
     the first wave comes."""
-    if any(scene.gravity):
+    if scene.sources:
         return 1.0
     speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
     speed = max(speeds) if speeds else max(_sound(scene.fluid, state) for state in states(scene.fluid))
@@ -193,23 +192,19 @@ def _inverse_sum(domain: Domain) -> float:
 
 def solid_sound(body: Body) -> float:
     """Longitudinal sound speed [m/s] of a body at rest."""
-    bulk = body.density * body.eos.reference_sound_speed(body.density) ** 2
+    bulk = body.eos.rest_bulk_modulus(body.density)
     return math.sqrt((bulk + 4.0 / 3.0 * body.strength.shear_modulus) / body.density)
 
 
 def solid_rate(scene: Scene, body: Body) -> float:
     """1/dt [1/s] of a body's particles (Monaghan's condition, safety 0.3), compressed by the fastest impact.
 
-    Behind a shock of particle velocity u and speed U = c0 + s1 u: sound speed c0 + (2 s1 - 1) u, volume 1 - u/U. With
-    bonds only a shock is viscous, not all there is.
+    With bonds only a shock is viscous, not all there is.
     """
     solid, c = scene.solid, solid_sound(body)
     alpha = solid.viscosity_alpha if solid.form_of(body) == "updated_lagrangian" else 0.0
     closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
-    u = 0.5 * max(closing)
-    compression = 1.0
-    if u > 0.0 and isinstance(body.eos, MieGrueneisen):
-        compression = 1.0 - u / (body.eos.c0 + body.eos.s1 * u)
-        c += (2.0 * body.eos.s1 - 1.0) * u
-    h = solid.smoothing * body.spacing * max(compression, 0.1) ** (1.0 / scene.domain.dimensions)
+    faster, volume = body.eos.behind_shock(0.5 * max(closing))
+    c += faster
+    h = solid.smoothing * body.spacing * max(volume, 0.1) ** (1.0 / scene.domain.dimensions)
     return c * (1.0 + 0.6 * alpha) / (0.3 * h)

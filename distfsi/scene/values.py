@@ -36,8 +36,8 @@ class Mirror(Table):
 def quantity(unit: str, **limits: float) -> Any:
     """Type of a number in `unit` within pydantic's `limits` (gt, ge, lt, le), given in SI or as a text with a unit."""
     words = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-    told = {"type": ["number", "string"], "unit": unit} | {words[key]: limit for key, limit in limits.items()}
-    return Annotated[float, Field(**limits), BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(told)]
+    shown = {"type": ["number", "string"], "unit": unit} | {words[key]: limit for key, limit in limits.items()}
+    return Annotated[float, Field(**limits), BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(shown)]
 
 
 def vector(unit: str) -> Any:
@@ -50,16 +50,16 @@ def vector(unit: str) -> Any:
             raise ValueError(f"has {len(entries)} entries, needs {wanted}, one per dimension of the domain")
         return tuple(to_si(entry, unit) for entry in entries)
 
-    told = {"type": ["array", "number", "string"], "items": {"type": ["number", "string"]}, "unit": unit}
-    return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(told)]
+    shown = {"type": ["array", "number", "string"], "items": {"type": ["number", "string"]}, "unit": unit}
+    return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(shown)]
 
 
 def counts(minimum: int) -> Any:
     """Type of a list of one to three whole numbers from `minimum` on; in 1D also a single number."""
     number = Annotated[int, Field(strict=True, ge=minimum)]
     as_list = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
-    told = {"type": ["array", "integer"], "items": {"type": "integer", "minimum": minimum}}
-    return Annotated[tuple[number, ...], Field(min_length=1, max_length=3), as_list, WithJsonSchema(told)]
+    shown = {"type": ["array", "integer"], "items": {"type": "integer", "minimum": minimum}}
+    return Annotated[tuple[number, ...], Field(min_length=1, max_length=3), as_list, WithJsonSchema(shown)]
 
 
 def _phase_name(value: Any, info: ValidationInfo) -> Any:

@@ -1,6 +1,6 @@
 """What forms when two fluid states meet: the exact Riemann problem for any of the input's equations of state.
 
-p = p_cold(rho) + G rho (e - e_cold(rho)); shocks by the Rankine-Hugoniot conditions, rarefactions along isentropes.
+Shocks by the Rankine-Hugoniot conditions, rarefactions along isentropes.
 """
 
 from __future__ import annotations
@@ -76,9 +76,9 @@ def _shock(side: Side, p: float) -> tuple[float, float]:
     def excess(rho: float) -> float:
         return pressure(eos, rho, e0 + 0.5 * (p + p0) * (1.0 / rho0 - 1.0 / rho)) - p
 
-    rho = rho0
-    while excess(rho) < 0.0 and rho < DENSEST * rho0:
-        rho *= 1.1
+    rho, densest = rho0, min(DENSEST * rho0, (1.0 - 1e-12) * eos.maximum_density)
+    while excess(rho) < 0.0 and rho < densest:
+        rho = min(1.1 * rho, densest)
     if excess(rho) >= 0.0:
         rho = brentq(excess, rho0, rho, xtol=1e-9 * rho0)
     return rho, sqrt((p - p0) * (1.0 / rho0 - 1.0 / rho))

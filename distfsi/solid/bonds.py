@@ -15,7 +15,8 @@ import numpy as np
 from distfsi.device.interface import Columns
 from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator
-from distfsi.mesh.particles import IMAGES, GhostPlan, Key, ParticleExchange
+from distfsi.mesh.kernels.particles import IMAGES
+from distfsi.mesh.particles import GhostPlan, Key, ParticleExchange
 from distfsi.scene.description import Solid
 from distfsi.solid.kernels import bonds as kernels
 from distfsi.solid.kernels.records import NEVER_BONDED, Bodies, Bonds, Fit, Particles
@@ -89,10 +90,11 @@ class BondNetwork:
         """Who is near whom, at the moment: a plan, the body (count,) of all particles, another one for images behind
         planes at which it ends, table and number of neighbours."""
         device = self._device
-        plan = exchange.ghosts(*c.read("position"), c["id"], self.support)
+        (own_position,) = c.read("position")
+        plan = exchange.ghosts(own_position, c["id"], self.support)
         state = device.array(np.column_stack([c["mass"], c["density"], c["h"]]))
         body = device.array(c["body"].astype(float))
-        given = [(*c.read("position"), "position"), (state, ((),) * 3), (body, ((),))]
+        given: list[tuple[Any, Any]] = [(own_position, "position"), (state, ((),) * 3), (body, ((),))]
         position, state, body = plan.exchange(given)
         found = self._search.find(plan.own, Particles(position, state), plan.key.device, self.support)
         table, count, body = (device.download(array) for array in (*found, body))
@@ -130,7 +132,7 @@ class BondNetwork:
         if key is not self._key:
             self._key, self._partner = key, self._rows_of_partners(c, key.host)
             n, width = self._partner.shape
-            if n and self._rows.least(self._partner.reshape(-1))[0] < 0:
+            if n and self._rows.minimum(self._partner.reshape(-1))[0] < 0:
                 raise Diverged("solid: the partner of a bond is not at hand")
             self._geometry = self._device.empty((n, width * (self._dimensions + 1)))
             bonds = Bonds(count, self._partner, self._geometry)

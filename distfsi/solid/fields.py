@@ -9,17 +9,19 @@ import numpy as np
 from distfsi.laws.law import Column
 
 ALWAYS = ("density", "energy", "id", "body")
-SOMETIMES = ("piece", "dust")  # where there are bonds; where debris is no wall
 SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 
 
-def outputs(columns: Mapping[str, np.ndarray], remembered: Iterable[Column]) -> dict[str, np.ndarray]:
-    """Position and velocity (n, 3), the scalars (n,), those that materials have `remembered` among them, and the stress
-    (n, 6) with the components xx, yy, zz, xy, yz, xz, of particles with these columns."""
+def outputs(
+    columns: Mapping[str, np.ndarray], remembered: Iterable[Column], others: Iterable[str]
+) -> dict[str, np.ndarray]:
+    """Position and velocity (n, 3), the scalars (n,), those that materials have `remembered` and those `others` among
+    them that there are, and the stress (n, 6) with the components xx, yy, zz, xy, yz, xz, of particles with these
+    columns."""
     D = columns["position"].shape[1]
     vectors = {name: np.pad(columns[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
     names = [*ALWAYS, *(column.name for column in remembered if column.written)]
-    names += [name for name in SOMETIMES if name in columns]
+    names += [name for name in ("piece", *others) if name in columns]
     stress = cauchy_stress(columns["deviator"], columns["pressure"], D)
     return vectors | {name: columns[name] for name in names} | {"stress": stress}
 

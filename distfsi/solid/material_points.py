@@ -27,7 +27,7 @@ class MaterialGroup:
         self.kernels = device.build(DRIVERS, {**constants, **material.constants}, material.bindings)
         self.rows = device.empty(0, np.int64)
 
-    def memory(self, columns: Columns) -> list[tuple]:
+    def memory(self, columns: Columns) -> list[tuple[Any, ...]]:
         """What is remembered for each of the laws, of all particles."""
         return [record(*columns.write(*record._fields)) for record in self._memory]
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from distfsi.device.interface import Device
 from distfsi.mesh.blocks import Blocks
@@ -31,6 +29,9 @@ def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, device: Device, co
 
 def _smallest(names: np.ndarray, links: np.ndarray) -> np.ndarray:
     """The smallest of the `names` (n,) that each of them is linked with; `links` (2, m) index the `names`."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     n = len(names)
     _, component = connected_components(coo_array((np.ones(links.shape[1], dtype=bool), tuple(links)), (n, n)), False)
     smallest = np.full(n, np.iinfo(np.int64).max)

@@ -15,6 +15,7 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.device.interface import Columns, Device, DualArray
 from distfsi.errors import Diverged
+from distfsi.laws.body_force import BodyForce
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels import particles as particle_kernels
@@ -25,13 +26,13 @@ from distfsi.scene.description import Scene
 from distfsi.scene.packing import initial_velocity, pack
 from distfsi.scene.shapes import contains
 from distfsi.solid import fields, neighbours, pieces, total_lagrangian, updated
-from distfsi.solid.form import SolidForm
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.kernels import motion
 from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
 
@@ -62,6 +63,7 @@ class Solid:
     before   (own, D) [m/s] velocities then, on the device
     carried  (own, D) [m/s] mean velocity since then, on the device
     sub_steps  that have been made since then
+    body_force  that of the sources, over the sub-step
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
@@ -71,6 +73,7 @@ class Solid:
         self.dimensions = D = scene.domain.dimensions
         self.materials = Materials(scene.solid, D)
         self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
+        self.body_force = BodyForce(scene.sources, D)
         constants = self._constants(scene)
         self.kernels = team.build(DRIVERS, constants)
         self._points = MaterialGroups(self.materials, team, constants)
@@ -87,6 +90,7 @@ class Solid:
         self._acceleration, self._limits = team.empty((0, D)), team.empty((0, len(LIMITS)))
         self.start, self.before, self.carried = (team.empty((0, D)) for _ in range(3))
         self.sub_steps = 0
+        self._shown: list[str] = []  # columns of others that field files show
         # What migrate() finds: the block of each particle, and the particles by block, body and id.
         self._home: DualArray | None = None
         self._block = self._order = np.empty(0, dtype=np.int64)
@@ -104,7 +108,7 @@ class Solid:
         return {
             "DIMENSIONS": D,
             "COMPONENTS": D * (D + 1) // 2,
-            "GRAVITY": tuple(map(float, scene.gravity)),
+            "BODY_FORCE": self.body_force.acceleration,
             "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
             "VISCOSITY_BETA": scene.solid.viscosity_beta,
             "SMOOTHING_RATIO": scene.solid.smoothing,
@@ -181,7 +185,7 @@ class Solid:
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
-        dt, index = rows.least(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        dt, index = rows.minimum(rows.taken(self._limits, self._groups.rows).reshape(-1))
         particle, cause = divmod(index, len(LIMITS))
         dt, id = float(dt), self.columns["id"][self._order[particle]]
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
@@ -245,6 +249,13 @@ class Solid:
         self._order = np.lexsort((self.columns["id"], group))
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
         self._groups = Groups(self.team, self.kernels, sizes, self._order)
+
+    def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
+        """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
+        into field files if it is `shown`."""
+        self.columns[name] = values
+        if shown:
+            self._shown.append(name)
 
     def _sorted(self, *names: str) -> dict[str, np.ndarray]:
         """The columns of these names by (block, body, id), an order that depends on nothing else."""
@@ -343,4 +354,5 @@ class Solid:
         block, body and id."""
         rows = self._order if chosen is None else chosen
         c = {name: column[rows] for name, column in self.columns.items()}
-        return fields.outputs(c, self.materials.columns) | {"von_mises": self._von_mises(c["deviator"].T)}
+        written = fields.outputs(c, self.materials.columns, self._shown)
+        return written | {"von_mises": self._von_mises(c["deviator"].T)}

@@ -8,11 +8,13 @@ from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
+from pydantic import BaseModel
+
 from distfsi.scene.schema import FluidInput, TimeInput
 
 Method = Mapping[str, str]  # values by key of the input, "fluid.riemann": "hll"
 
-_TABLES = {"fluid": FluidInput, "time": TimeInput}
+_TABLES: dict[str, type[BaseModel]] = {"fluid": FluidInput, "time": TimeInput}
 
 
 @cache
@@ -28,7 +30,7 @@ def choices() -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _values(annotation: Any) -> tuple:
+def _values(annotation: Any) -> tuple[Any, ...]:
     """The values of an annotation that has finitely many; none of any other."""
     if annotation is bool:
         return (False, True)

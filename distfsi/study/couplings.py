@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from distfsi.study.references import STEEL_TUBE
@@ -39,8 +40,9 @@ class Problem:
 
 def kept_mass(simulation: Simulation) -> Figure:
     """What the coupling has left of the fluid's mass, over that."""
-    made = sum(amounts[0] for amounts in simulation.coupling.ledger().values())
-    mass = simulation.fluid.totals(simulation.coupling.volume)[0][0]
+    coupling = present(simulation.coupling)
+    made = sum(amounts[0] for amounts in coupling.budget_by_cause().values())
+    mass = present(simulation.fluid).totals(coupling.volume)[0][0]
     return Figure("mass", 1.0 + made / mass, 1.0, 1e-12)
 
 
@@ -48,12 +50,12 @@ def piston(simulation: Simulation) -> list[Figure]:
     """A piston at the speed of sound: the force on its two faces, how it swings about its mean, and the pressure before
     it (exact for a gas with gamma 1.4)."""
     ahead, behind, end = 3.472666530, 0.2097152, simulation.scene.time.end
-    force = []
+    solid, forces = present(simulation.solid), []
     while not simulation.done:
         simulation.step()
         if simulation.time > 0.4 * end:
-            force.append(-simulation.blocks.sum(simulation.solid.given.sum(axis=1))[0] / simulation.dt)
-    force, exact = np.array(force), ahead - behind
+            forces.append(-simulation.blocks.sum(solid.given.sum(axis=1))[0] / simulation.dt)
+    force, exact = np.array(forces), ahead - behind
     x, p = _profile(simulation, 2)
     before = (x > 1.2 + end + 0.05) & (x < 1.2 + 1.76619 * end - 0.1)
     return [
@@ -68,17 +70,17 @@ def free_plate(simulation: Simulation) -> list[Figure]:
     """Gas drives a plate into a vacuum: its velocity (exact), and the mass of the gas."""
     while not simulation.done:
         simulation.step()
-    totals = simulation.solid.totals()
+    totals = present(simulation.solid).totals()
     return [Figure("velocity", totals["momentum"][0] / totals["mass"], 0.3909302681, 5e-3), kept_mass(simulation)]
 
 
 def taylor_plate(simulation: Simulation) -> list[Figure]:
     """A plate thrown by an exponential wave in water: its largest velocity, and when it has it (Taylor, 1941)."""
     arrival = 0.3 / (4.4 * 601e6 / 1000.0) ** 0.5
-    time, velocity = [], []
+    solid, time, velocity = present(simulation.solid), [], []
     while not simulation.done:
         simulation.step()
-        body = simulation.solid.body_totals(1)
+        body = solid.body_totals(1)
         time.append(simulation.time - arrival)
         velocity.append(float(body["momentum"][0] / body["mass"][0]))
     largest = int(np.argmax(velocity))
@@ -92,10 +94,10 @@ def tube(simulation: Simulation) -> list[Figure]:
     """The steel tube without strength at 10 us: inner radius and mean velocity (1-D computation)."""
     while not simulation.done:
         simulation.step()
-    c = simulation.solid.columns
+    c = present(simulation.solid).columns
     start, x = np.hypot(*c["reference"].T), c["position"]
     radius = np.hypot(*x.T)
-    first, spacing = start < start.min() * (1.0 + 1e-6), simulation.scene.solid.bodies[0].spacing
+    first, spacing = start < start.min() * (1.0 + 1e-6), present(simulation.scene.solid).bodies[0].spacing
     inner = radius[first].mean() - 0.5 * spacing * start.min() / radius[first].mean()
     reference = next(r for r in STEEL_TUBE if r.time == 10e-6)
     return [
@@ -108,8 +110,9 @@ def tube(simulation: Simulation) -> list[Figure]:
 
 def _profile(simulation: Simulation, variable: int) -> tuple[np.ndarray, np.ndarray]:
     """Cell centers and a primitive variable of a run in one dimension and one block."""
-    (x, *_), state = simulation.blocks.cell_centers(0), simulation.fluid.cells(0)[:, 0, 0]
-    return np.asarray(x), np.array(simulation.fluid.model.formula("primitives")(tuple(state)))[variable]
+    fluid = present(simulation.fluid)
+    (x, *_), state = simulation.blocks.cell_centers(0), fluid.cells(0)[:, 0, 0]
+    return np.asarray(x), np.array(fluid.model.formula("primitives")(tuple(state)))[variable]
 
 
 PISTON = Problem(

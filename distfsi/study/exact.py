@@ -22,16 +22,19 @@ from scipy.optimize.elementwise import find_root
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
-from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 
 Array = NDArray[np.float64]
+ExactEos = IdealGas | StiffenedGas | Jwl  # those whose isentropes are written down here
 
 LEFTWARD, RIGHTWARD = -1, 1
 WEAK = 1e-5  # a pressure rise below WEAK rho c^2 is as good as isentropic: entropy rises with its cube
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _RELATIVE = 4 * np.finfo(float).eps
 _TINY = np.finfo(float).tiny
+
+
+Values = float | np.ndarray  # one number or many
 
 
 @dataclass(frozen=True)
@@ -57,19 +60,24 @@ class Wave:
 class Material:
     """A fluid EOS through its isentropes; densities may be numbers or arrays."""
 
-    eos: FluidEos
+    eos: ExactEos
 
     @property
     def omega(self) -> float:
         """Grueneisen coefficient w: p depends on energy as w rho e."""
-        return self.eos.omega if isinstance(self.eos, Jwl) else self.eos.gamma - 1.0
+        match self.eos:
+            case IdealGas(gamma=gamma) | StiffenedGas(gamma=gamma):
+                return gamma - 1.0
+            case Jwl(omega=omega):
+                return omega
+        raise TypeError(f"no exact solution knows {self.eos}")
 
     @property
     def lowest_pressure(self) -> float:
         """Pressure that an expansion tends to as the density goes to zero [Pa]."""
         return -self.eos.p_inf if isinstance(self.eos, StiffenedGas) else 0.0
 
-    def reference(self, density):
+    def reference(self, density: Values) -> tuple[Values, Values, Values]:
         """Pressure [Pa], its slope [m2/s2] and internal energy [J/kg] on the isentrope K = 0."""
         match self.eos:
             case IdealGas():
@@ -80,23 +88,24 @@ class Material:
                 v = rho0 / density
                 a, b = A * np.exp(-R1 * v), B * np.exp(-R2 * v)
                 return a + b, (R1 * a + R2 * b) * v / density, (a / R1 + b / R2) / rho0
+        raise TypeError(f"no exact solution knows {self.eos}")
 
-    def energy(self, density, pressure):
+    def energy(self, density: Values, pressure: Values) -> Values:
         """Specific internal energy [J/kg]."""
         p_ref, _, e_ref = self.reference(density)
         return e_ref + (pressure - p_ref) / (self.omega * density)
 
-    def sound_speed(self, density, pressure):
+    def sound_speed(self, density: Values, pressure: Values) -> Values:
         """Isentropic sound speed [m/s]."""
         p_ref, slope, _ = self.reference(density)
         return np.sqrt(slope + (1.0 + self.omega) * (pressure - p_ref) / density)
 
-    def isentrope(self, start: PureState, density):
+    def isentrope(self, start: PureState, density: Values) -> Values:
         """Pressure at `density` on the isentrope through `start` [Pa]."""
         p_ref, p_ref_start = self.reference(density)[0], self.reference(start.density)[0]
         return p_ref + (start.pressure - p_ref_start) * (density / start.density) ** (1.0 + self.omega)
 
-    def expansion_velocity(self, start: PureState, density):
+    def expansion_velocity(self, start: PureState, density: Values) -> Values:
         """Integral of c d(rho)/rho along the isentrope from `density` up to `start` [m/s].
 
         Gauss's rule in rho^(w/2), in which c d(rho)/rho is constant for ideal and stiffened gas and smooth for JWL.
@@ -113,7 +122,7 @@ class Material:
         V0, e0 = 1.0 / ahead.density, self.energy(ahead.density, ahead.pressure)
 
         def hugoniot(V: float) -> float:
-            return self.energy(1.0 / V, pressure) - e0 - 0.5 * (pressure + ahead.pressure) * (V0 - V)
+            return float(self.energy(1.0 / V, pressure) - e0) - 0.5 * (pressure + ahead.pressure) * (V0 - V)
 
         return 1.0 / brentq(hugoniot, V0 * self.omega / (2.0 + self.omega), V0, xtol=_TINY, rtol=_RELATIVE)
 
@@ -121,12 +130,12 @@ class Material:
         """Density where the isentrope through `start` has `pressure`, lower or by a trace higher [kg/m3]."""
 
         def mismatch(rho: float) -> float:
-            return self.isentrope(start, rho) - pressure
+            return float(self.isentrope(start, rho)) - pressure
 
         return brentq(mismatch, 1e-60 * start.density, 1.001 * start.density, xtol=_TINY, rtol=_RELATIVE)
 
 
-def wave_into(ahead: PureState, eos: FluidEos, pressure: float, direction: int) -> Wave:
+def wave_into(ahead: PureState, eos: ExactEos, pressure: float, direction: int) -> Wave:
     """The wave running in `direction` into `ahead` that leaves `pressure` [Pa] behind it."""
     material, rho0, p0, u0 = Material(eos), ahead.density, ahead.pressure, ahead.velocity
     c0 = float(material.sound_speed(rho0, p0))
@@ -148,7 +157,7 @@ def escape_velocity(state: PureState, eos: IdealGas | Jwl, direction: int) -> fl
     return state.velocity + direction * float(Material(eos).expansion_velocity(state, 0.0))
 
 
-def exact_piston(state: PureState, eos: FluidEos, velocity: float, direction: int = RIGHTWARD) -> Wave:
+def exact_piston(state: PureState, eos: ExactEos, velocity: float, direction: int = RIGHTWARD) -> Wave:
     """The wave that a wall moving with constant `velocity` [m/s] sends in `direction` into `state`.
 
     Raises ValueError if the wall leaves the fluid behind.
@@ -176,8 +185,8 @@ class RiemannSolution:
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
     p_star: float
     u_star: float
     left_wave: Wave
@@ -203,7 +212,7 @@ class RiemannSolution:
         return rho, u, p, is_left
 
 
-def exact_riemann(left: PureState, right: PureState, eos_left: FluidEos, eos_right: FluidEos) -> RiemannSolution:
+def exact_riemann(left: PureState, right: PureState, eos_left: ExactEos, eos_right: ExactEos) -> RiemannSolution:
     """Solve the Riemann problem of two fluids, each with its own EOS.
 
     Raises ValueError if the two move apart so fast that a vacuum opens between them.
@@ -220,7 +229,7 @@ def exact_riemann(left: PureState, right: PureState, eos_left: FluidEos, eos_rig
     return RiemannSolution(left, right, eos_left, eos_right, p, u, left_wave, right_wave)
 
 
-def _sample_side(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, ...]:
+def _sample_side(ahead: PureState, eos: ExactEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, ...]:
     """Density, velocity and pressure that one side's wave gives at x/t = `speed`."""
     beyond = direction * speed >= direction * wave.head
     columns = [
@@ -234,12 +243,13 @@ def _sample_side(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, sp
     return tuple(columns)
 
 
-def _fan(ahead: PureState, eos: FluidEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, Array, Array]:
+def _fan(ahead: PureState, eos: ExactEos, wave: Wave, direction: int, speed: Array) -> tuple[Array, Array, Array]:
     """Density, velocity and pressure inside a rarefaction fan, where u + direction c = x/t = `speed`."""
     material = Material(eos)
 
     def state_at(rho: Array) -> tuple[Array, Array]:
-        return ahead.velocity - direction * material.expansion_velocity(ahead, rho), material.isentrope(ahead, rho)
+        velocity = ahead.velocity - direction * material.expansion_velocity(ahead, rho)
+        return np.asarray(velocity), np.asarray(material.isentrope(ahead, rho))
 
     def mismatch(rho: Array, speed: Array) -> Array:
         u, p = state_at(rho)

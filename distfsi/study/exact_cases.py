@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from distfsi.study.problems import INPUTS, centers, fields, riemann_of, start
@@ -92,7 +93,7 @@ def blast_line(dimensions: int, cells: int) -> str:
     settings = [f"domain={{{box}, {ends}}}"]
     settings += [f"fluid.regions.1.shape.center={[0.0] * D}", f"fluid.regions.1.shape.radius={hot}"]
     one, two = (
-        start(load(INPUTS / "sedov.toml", [*settings, f"fluid.regions.1.pressure={p}"])).fluid.totals()[0][-1]
+        present(start(load(INPUTS / "sedov.toml", [*settings, f"fluid.regions.1.pressure={p}"])).fluid).totals()[0][-1]
         for p in (1.0, 2.0)
     )
     pressure = blast.energy / 2**D / (two - one)  # the cells that the ball covers in part do not add up to it exactly
@@ -148,7 +149,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, overrides, (COARSE, MIDDLE, FINE), False)
 
 
-def _study(communicator, overrides, cells, quick) -> None:
+def _study(communicator: Communicator, overrides: Sequence[str], cells: tuple[int, int, int], quick: bool) -> None:
     if communicator.size > 1:
         raise InputError(["study exact cases: runs on one rank"])
     with threadpool_limits(1):

@@ -45,21 +45,21 @@ class Lift(NamedTuple):
 def lift(gap: float, density: float, end: float, angles: int) -> Lift:
     """The flight of a cylinder that starts a `gap` above the floor, with so many cells around half of it."""
     mesh = _Mesh(angles)
-    place, velocity = START + (0.0, gap), np.zeros(2)
+    position, velocity = START + (0.0, gap), np.zeros(2)
     mass = np.pi * RADIUS**2 * density
-    Q = mesh.content(place)
+    Q = mesh.content(position)
     time, samples = 0.0, []
     while time < end:
-        samples.append((time, *place, *velocity))
-        dt = min(CFL * mesh.largest_step(Q, place, velocity), end - time)
-        rate, force = mesh.rates(Q, time, place, velocity)
-        Q1, place1, velocity1 = Q + dt * rate, place + dt * velocity, velocity + dt * force / mass
-        rate, force = mesh.rates(Q1, time + dt, place1, velocity1)
+        samples.append((time, *position, *velocity))
+        dt = min(CFL * mesh.largest_step(Q, position, velocity), end - time)
+        rate, force = mesh.rates(Q, time, position, velocity)
+        Q1, position1, velocity1 = Q + dt * rate, position + dt * velocity, velocity + dt * force / mass
+        rate, force = mesh.rates(Q1, time + dt, position1, velocity1)
         Q = 0.5 * (Q + Q1 + dt * rate)
-        place = 0.5 * (place + place1 + dt * velocity1)
+        position = 0.5 * (position + position1 + dt * velocity1)
         velocity = 0.5 * (velocity + velocity1 + dt * force / mass)
         time += dt
-    return Lift(*np.array([*samples, (time, *place, *velocity)]).T)
+    return Lift(*np.array([*samples, (time, *position, *velocity)]).T)
 
 
 class _Mesh:
@@ -90,31 +90,31 @@ class _Mesh:
         ends = (np.array([self.outer, np.full_like(self.outer, y)]) for y in (-height, HEIGHT - height))
         return [c[:, None] + s[:, None] * (e - c)[:, None] for c, s, e in zip(curves, self.shares, ends, strict=True)]
 
-    def incident(self, time: float, place: Array) -> Array:
+    def incident(self, time: float, position: Array) -> Array:
         """Density, velocity, pressure behind and ahead of the undisturbed shock in all cells."""
-        middle = np.concatenate([_means(part) for part in self.parts(place[1])], axis=1)
-        passed = middle[0] + place[0] < SHOCK_START + SHOCK_SPEED * time
+        middle = np.concatenate([_means(part) for part in self.parts(position[1])], axis=1)
+        passed = middle[0] + position[0] < SHOCK_START + SHOCK_SPEED * time
         return np.where(passed, np.array(BEHIND)[:, None, None], np.array(AHEAD)[:, None, None])
 
-    def content(self, place: Array) -> Array:
+    def content(self, position: Array) -> Array:
         """What the cells hold at the start."""
-        rho, u, v, p = self.incident(0.0, place)
-        volume = np.concatenate([_volumes(part) for part in self.parts(place[1])])
+        rho, u, v, p = self.incident(0.0, position)
+        volume = np.concatenate([_volumes(part) for part in self.parts(position[1])])
         return volume * np.array(
             [rho, rho * u, rho * v, p / (GAMMA - 1.0) + 0.5 * rho * (u**2 + v**2), np.ones_like(rho)]
         )
 
-    def largest_step(self, Q: Array, place: Array, velocity: Array) -> float:
+    def largest_step(self, Q: Array, position: Array, velocity: Array) -> float:
         """The time in which no signal crosses a cell."""
         rho, u, v, p = _states(Q)
-        sides = [(np.hypot(*_along(part))[:-1], np.hypot(*_across(part))[:, :-1]) for part in self.parts(place[1])]
+        sides = [(np.hypot(*_along(part))[:-1], np.hypot(*_across(part))[:, :-1]) for part in self.parts(position[1])]
         longest = [np.maximum(*pair) for pair in sides]
         signal = np.hypot(u - velocity[0], v - velocity[1]) + np.sqrt(GAMMA * p / rho) + abs(velocity[1])
         return float((Q[4] / np.concatenate(longest) / signal).min())
 
-    def rates(self, Q: Array, time: float, place: Array, velocity: Array) -> tuple[Array, Array]:
+    def rates(self, Q: Array, time: float, position: Array, velocity: Array) -> tuple[Array, Array]:
         """Rates of the contents, and the force on the cylinder."""
-        w, far, parts = _states(Q), self.incident(time, place), self.parts(place[1])
+        w, far, parts = _states(Q), self.incident(time, position), self.parts(position[1])
         below, wet, dry = self.below, self.wet, self.dry
         rate = np.zeros_like(Q)
         faces = [np.array([-a[1], a[0]]) for a in map(_along, parts)]

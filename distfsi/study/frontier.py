@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.scatter import Point, draw_scatter
 from distfsi.simulation import Simulation
 from distfsi.study.solids import Figure
@@ -59,7 +60,7 @@ class Frontier:
     def measure(self, problem: Any, variant: str, spacing: float, overrides: Sequence[str]) -> Outcome:
         """Run a variant on a problem at a spacing [m]."""
         simulation = self.start(problem, variant, spacing, overrides)
-        particles = len(simulation.solid.columns["id"])
+        particles = len(present(simulation.solid).columns["id"])
         self.start(problem, variant, spacing, overrides).step()  # compiles
         started = clock.process_time()
         try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import time as clock
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.scatter import Point, draw_scatter
 from distfsi.scene.description import Scene
 from distfsi.study.choices import Method, default, exists, name_of, settings, varied_alone
@@ -167,7 +168,7 @@ def draw(problem: Problem, outcomes: Sequence[Outcome], scene: Scene) -> None:
     ]
     known = problem is WATER_AIR
     others = peer_points(scene, outcomes[0]) if known else ()
-    lines = () if known or len(scene.fluid.phases) == 1 else peer_lines(problem, outcomes[0])
+    lines = () if known or len(present(scene.fluid).phases) == 1 else peer_lines(problem, outcomes[0])
     per_row = " per row" if problem.rows else ""
     draw_scatter(
         DIRECTORY / f"{problem.name}.png", f"{problem.title}: default {outcomes[0].cells} cells along x",
@@ -222,7 +223,9 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, list(variants()), {problem: problem.cells for problem in PROBLEMS}, overrides)
 
 
-def _study(communicator, chosen, cells, overrides) -> None:
+def _study(
+    communicator: Communicator, chosen: Sequence[Variant], cells: Mapping[Problem, int], overrides: Sequence[str]
+) -> None:
     if communicator.size > 1:
         raise InputError(["study frontier fluid: runs on one rank"])
     print("default: " + ", ".join(f"{key} {word}" for key, word in default().items()))

@@ -1,4 +1,4 @@
-"""What the compiler makes of each kernel for a GPU: registers, spills, instructions. `python -m distfsi study kernels`.
+"""What the compiler makes of each kernel for a GPU: registers, spills, instructions. `distfsi study kernels`.
 
 It needs NVRTC and a C++ compiler, but no GPU. It writes gpu-kernels.csv: every kernel of all inputs, in float64 and
 float32, and of standard fluids, for each architecture; a text that several of them need stands there once.
@@ -16,22 +16,26 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.commands import works
 from distfsi.device import nvrtc
 from distfsi.device.cpu import Team
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.errors import InputError
 from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels.regions import pack_cells, unpack_cells
 from distfsi.mesh.kernels.rows import pack_rows
+from distfsi.resources import works
 from distfsi.scene import load
 from distfsi.scene.description import Scene
-from distfsi.simulation import Simulation, coupled_step, fluid_step, solid_step
+from distfsi.scene.shipped import shipped_inputs
+from distfsi.simulation import Simulation
+from distfsi.step import TimeStep, find_forces, make_step
 
 REALS = ("float64", "float32")
-INPUTS = Path("inputs")
+INPUTS = shipped_inputs()
+DIRECTORY = Path("out/study_kernels")
 TIME_STEP = 1e-9
 STEPS_OF_DEBRIS = 8
 CELLS = {1: (256,), 2: (32, 32), 3: (16, 16, 32)}
@@ -70,7 +74,7 @@ Calls = dict[tuple, Call]  # by driver and signature: a kernel, and arguments th
 
 def key_of(kernel: Kernel, arguments: Sequence[Any]) -> tuple:
     """What tells calls of one scene apart."""
-    return kernel.driver, kernel.signature(arguments)
+    return kernel.driver, kernel.signature(kernel.given(arguments))
 
 
 class Inventory(Gpu):
@@ -123,25 +127,22 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     simulation = Simulation.of(scene, communicator, device=gpu)
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
 
-    def time_step() -> tuple[float, int]:
-        if solid:
-            solid.time_step()
-        if coupling:
-            coupling.time_step()
+    with np.errstate(all="ignore"):
+        find_forces(solid, coupling, simulation.timers)
         if fluid:
             fluid.fastest_signal()
-        return TIME_STEP, 2
-
-    step = coupled_step if coupling else fluid_step if fluid else solid_step
-    with np.errstate(all="ignore"):
-        step(*simulation.parts, time_step)
+        for part in (solid, coupling):
+            if part:
+                part.time_step()
+        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, 2), simulation.timers)
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)
-            coupling.absorb()
+            geometry, state = coupling.geometry, fluid.device_state
+            coupling.absorb(geometry.lists, geometry.walls)
             coupling.trapped()
-            coupling.drag(gpu.empty(1, np.int64), gpu.empty((solid.count, D)))
-            coupling.wall.add_balls(
+            coupling.drag(geometry, gpu.empty(1, np.int64), state, gpu.empty((solid.count, D)), TIME_STEP)
+            coupling.wall.add_spheres(
                 gpu.empty(1, np.int64), gpu.empty((1, D)), gpu.empty((1, 2 + D)), gpu.empty(1, np.int64)
             )
         simulation.watch()
@@ -150,8 +151,8 @@ def inventory(scene: Scene, communicator: Communicator) -> Inventory:
 
 def calls_of_debris(communicator: Communicator) -> Calls:
     """What particles call only where they fail, or near other ranks."""
-    team = Listening()
-    simulation = Simulation.of(works.bursting_ball(), communicator, device=team)
+    device = Listening()
+    simulation = Simulation.of(works.bursting_ball(), communicator, device=device)
     for _ in range(STEPS_OF_DEBRIS):
         simulation.step()
     rows, reals = np.zeros(1, np.int64), [np.zeros(1, real) for real in REALS]
@@ -159,7 +160,7 @@ def calls_of_debris(communicator: Communicator) -> Calls:
     packed += [(pack_cells, (rows, rows, rows, 1, values, 1, 1, values)) for values in reals]
     packed += [(unpack_cells, (rows, 1, 1, values, 1, 1, values)) for values in reals]
     kernels = [(Kernel(driver, {}, {}, "float64"), arguments) for driver, arguments in packed]
-    return team.calls | {key_of(*call): call for call in kernels}
+    return device.calls | {key_of(*call): call for call in kernels}
 
 
 @dataclass
@@ -189,9 +190,10 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
         calls = [*gpu.calls.values()]
         calls += [(kernel, a) for kernel in others for _, a in known[precision(scene), kernel.driver].values()]
         for kernel, arguments in calls:
-            key = repr(kernel), kernel.signature(arguments)
-            text = written.get(key) or written.setdefault(key, kernel.text(arguments))
-            of = texts.setdefault(text, Text(kernel, arguments, scene.domain.dimensions, {}))
+            given = kernel.given(arguments)
+            key = repr(kernel), kernel.signature(given)
+            text = written.get(key) or written.setdefault(key, kernel.text(given))
+            of = texts.setdefault(text, Text(kernel, given, scene.domain.dimensions, {}))
             of.scenes[name] = None
     return texts
 
@@ -257,18 +259,39 @@ def rows(text: str, of: Text, architectures: Sequence[str] = ARCHITECTURES) -> I
         }
 
 
-def main(communicator: Communicator, overrides: list[str]) -> None:
-    """Write gpu-kernels.csv and print the stage's part of it."""
-    path, found = Path("gpu-kernels.csv"), texts({**shipped(INPUTS), **standard()}, communicator)
+def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """The kernels of Sod's tube for one architecture."""
+    _study(communicator, overrides, {"sod": load(INPUTS / "sod.toml")}, ("sm_90",))
+
+
+def main(communicator: Communicator, overrides: Sequence[str]) -> None:
+    """Write gpu-kernels.csv into DIRECTORY and print the stage's part of it."""
+    _study(communicator, overrides, {**shipped(INPUTS), **standard()}, ARCHITECTURES)
+
+
+def _study(
+    communicator: Communicator,
+    overrides: Sequence[str],
+    scenes: Mapping[str, Scene],
+    architectures: Sequence[str],
+) -> None:
+    if communicator.size > 1 or overrides:
+        raise InputError(["study kernels: runs on one rank and takes no overrides"])
+    try:
+        compiler = nvrtc.version()
+    except nvrtc.CompileError as error:
+        raise InputError([f"study kernels: {error}"]) from error
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    path, found = DIRECTORY / "gpu-kernels.csv", texts(scenes, communicator)
     with open(path, "w", newline="") as file, ThreadPoolExecutor() as pool:
         writer = None
-        for rows_of_text in pool.map(lambda item: [*rows(*item)], found.items()):
+        for rows_of_text in pool.map(lambda item: [*rows(*item, architectures)], found.items()):
             for row in rows_of_text:
                 writer = writer or _begun(file, row)
                 writer.writerow(row)
                 if row["kernel"] == "advance_tiles":
                     print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
-    print(f"{path}, by NVRTC {nvrtc.version()}")
+    print(f"{path}, by NVRTC {compiler}")
 
 
 def _begun(file: Any, row: dict[str, Any]) -> csv.DictWriter:

@@ -11,19 +11,22 @@ from typing import NamedTuple
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.scene import load
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study import fitted_cylinder, fitted_liftoff
 from distfsi.study.references import LIFTOFF
-from distfsi.study.tracks import Measure, Tracks, follow, write_tracks
+from distfsi.study.tracks import Measure, Tracks, record_tracks, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "liftoff.toml"
+INPUT = shipped_inputs() / "liftoff.toml"
 DIRECTORY = Path("out/study_liftoff")
 CELLS_ACROSS = (20, 40, 80)  # the channel, which is 0.2 high; twice as many particles
 STEPS_BETWEEN_SAMPLES = 5
 CYLINDER_CELLS = (10, 20, 40)  # across the cylinder away from the floor
 FITTED_CELLS = 100  # around half of it
+QUICK_CELLS = 25  # the same of a quick look
 RAISED, RAISED_CELLS = 0.01, 50  # height above the floor of one that starts in gas, and cells around half of it
 
 
@@ -45,9 +48,10 @@ SURROUNDINGS = {
 
 def measure_of(simulation: Simulation) -> Measure:
     """Centre and velocity of the cylinder."""
+    solid = present(simulation.solid)
 
     def measure() -> Mapping[str, float]:
-        body = simulation.solid.body_totals(0)
+        body = solid.body_totals(0)
         (x, y), (u, v) = body["center"], body["momentum"] / body["mass"]
         return {"x": float(x), "y": float(y), "u": float(u), "v": float(v)}
 
@@ -59,7 +63,7 @@ def run(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tra
     size = [f"domain.cells=[{5 * cells},{cells}]", f"solid.bodies.cylinder.spacing={0.1 / cells!r}"]
     scene = load(INPUT, [*size, f'output.directory="{DIRECTORY / str(cells)}"', *overrides])
     times = [instant.time for instant in LIFTOFF]
-    return follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
+    return record_tracks(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, times)
 
 
 def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str]) -> Tracks:
@@ -71,7 +75,7 @@ def run_raised(communicator: Communicator, cells: int, overrides: Sequence[str])
 
 def lift_raised(end: float, cells: int = RAISED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_liftoff.lift(RAISED, body.density, end, cells)._asdict()
 
 
@@ -90,27 +94,26 @@ def throw(communicator: Communicator, around: Surroundings, cells: int, override
         f"solid.bodies.cylinder.spacing={0.5 * h!r}",
         f'output.directory="{DIRECTORY / f"thrown_{cells}"}"',
     ]
-    return follow(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
+    return record_tracks(load(INPUT, [*settings, *overrides]), communicator, measure_of, STEPS_BETWEEN_SAMPLES)
 
 
 def flight(around: Surroundings, end: float, cells: int = FITTED_CELLS) -> Tracks:
     """The same by the other computation, with so many cells around half the cylinder."""
-    (body,) = load(INPUT).solid.bodies
+    (body,) = present(load(INPUT).solid).bodies
     return fitted_cylinder.fly(around.mesh(cells), body.density, end)._asdict()
 
 
 def centres(tracks: Tracks) -> list[tuple[float, float]]:
     """(x, y) at the times of the references; NaN where the run does not reach them."""
     latest = tracks["time"][-1] * (1.0 + 1e-9)
-    return [
-        tuple(float(np.interp(r.time, tracks["time"], tracks[axis])) if r.time <= latest else np.nan for axis in "xy")
-        for r in LIFTOFF
-    ]
+    times = [r.time if r.time <= latest else np.nan for r in LIFTOFF]
+    x, y = (np.interp(times, tracks["time"], tracks[axis]) for axis in "xy")
+    return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def row(name: str, places: Sequence[tuple[float, float]]) -> str:
+def row(name: str, positions: Sequence[tuple[float, float]]) -> str:
     """A line of the table."""
-    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in places)
+    return f"{name:>24}" + "".join(f"   {x:8.4f} {y:8.4f}" for x, y in positions)
 
 
 def draw(runs: Mapping[int, Tracks]) -> None:
@@ -126,19 +129,19 @@ def draw(runs: Mapping[int, Tracks]) -> None:
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
-    """Coarse cells until the first time."""
+    """Coarse cells and fitted meshes until the first time."""
     until = f"time.end={LIFTOFF[0].time}"
-    _study(communicator, CELLS_ACROSS[:1], [until, *overrides])
-    _compare(communicator, CYLINDER_CELLS[:1], [until, *overrides])
+    _study(communicator, CELLS_ACROSS[:1], [until, *overrides], QUICK_CELLS)
+    _compare(communicator, CYLINDER_CELLS[:1], [until, *overrides], QUICK_CELLS)
 
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     """All resolutions; print the places of the centre, leave tracks, charts and fields in DIRECTORY."""
-    _study(communicator, CELLS_ACROSS, overrides)
-    _compare(communicator, CYLINDER_CELLS, overrides)
+    _study(communicator, CELLS_ACROSS, overrides, RAISED_CELLS)
+    _compare(communicator, CYLINDER_CELLS, overrides, FITTED_CELLS)
 
 
-def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
+def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str], fitted: int) -> None:
     runs = {cells: run(communicator, cells, overrides) for cells in sizes}
     raised = {cells: run_raised(communicator, cells, overrides) for cells in sizes[:2]}
     if communicator.rank > 0:
@@ -151,20 +154,20 @@ def _study(communicator: Communicator, sizes: Sequence[int], overrides: Sequence
     for cells, tracks in runs.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"{'raised by ' + format(RAISED, 'g'):>24}")
-    print(row("fitted mesh", centres(lift_raised(runs[sizes[0]]["time"][-1]))))
+    print(row("fitted mesh", centres(lift_raised(runs[sizes[0]]["time"][-1], fitted))))
     for cells, tracks in raised.items():
         print(row(f"h = {0.2 / cells:g}", centres(tracks)))
     print(f"tracks, charts and fields in {DIRECTORY}", flush=True)
 
 
-def _compare(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str]) -> None:
+def _compare(communicator: Communicator, sizes: Sequence[int], overrides: Sequence[str], fitted: int) -> None:
     """Print how far the cylinder has come away from the floor, and its velocity, at the times of the references."""
     for name, around in SURROUNDINGS.items():
         runs = {f"{n} cells across": throw(communicator, around, n, overrides) for n in sizes}
         if communicator.rank > 0:
             continue
         end = next(iter(runs.values()))["time"][-1]
-        runs = {"fitted mesh": flight(around, end), **runs}
+        runs = {"fitted mesh": flight(around, end, fitted), **runs}
         times = [r.time for r in LIFTOFF if r.time <= end * (1.0 + 1e-9)]
         print(f"{name + ': path, speed at':>24}" + "".join(f"   t = {time:<14g}" for time in times))
         for label, t in runs.items():

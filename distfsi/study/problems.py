@@ -9,21 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
+from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import of_kind, present
 from distfsi.scene import load
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
-from distfsi.scene.description import Box, HalfSpace, Performance, Scene, Shape
+from distfsi.scene.description import Ball, BoundaryKind, Box, HalfSpace, Performance, Scene, Shape
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
-from distfsi.study.exact import PureState, exact_riemann
+from distfsi.study.exact import ExactEos, PureState, RiemannSolution, exact_riemann
 from distfsi.study.radial import Rings, cylindrical_explosion
 
-INPUTS = Path(__file__).parents[2] / "inputs"
-PERIODIC = ("periodic", "periodic")
+INPUTS = shipped_inputs()
+PERIODIC: tuple[BoundaryKind, BoundaryKind] = ("periodic", "periodic")
 QUANTITIES = ("density", "velocity", "pressure")
 
 Exact = Callable[[Scene, Sequence[np.ndarray]], Sequence[np.ndarray]]
@@ -67,9 +70,14 @@ class Problem:
         return np.array([np.abs(a - b).mean() / np.abs(b).mean() for a, b in pairs])
 
 
+def _in_the_plane(source: Any) -> Any:
+    """A source of one dimension in two."""
+    return replace(source, acceleration=(*source.acceleration, 0.0))
+
+
 def in_rows(scene: Scene, rows: int) -> Scene:
     """A scene in one dimension as `rows` equal ones in two, periodic across."""
-    domain, fluid = scene.domain, scene.fluid
+    domain, fluid = scene.domain, present(scene.fluid)
     upper = rows * domain.spacing[0]
     wide = replace(
         domain,
@@ -89,7 +97,7 @@ def in_rows(scene: Scene, rows: int) -> Scene:
     return replace(
         scene,
         domain=wide,
-        gravity=(*scene.gravity, 0.0),
+        sources=tuple(_in_the_plane(source) for source in scene.sources),
         fluid=replace(fluid, regions=regions, inflow=(*fluid.inflow, (None, None))),
         performance=Performance(BLOCK_CELLS[1], TILE_CELLS[1]),
     )
@@ -116,7 +124,7 @@ def centers(simulation: Simulation) -> list[np.ndarray]:
 def fields(simulation: Simulation) -> dict[str, np.ndarray]:
     """Primitive fields (z, y, x[, 3]) of the whole domain, float64; of a run on one rank."""
     blocks, result = simulation.blocks, {}
-    for name, parts in simulation.fluid.outputs().items():
+    for name, parts in present(simulation.fluid).outputs().items():
         whole = np.empty((*blocks.grid.cells[::-1], *parts.shape[4:]))
         for part, (x, y, z), (n, m, l) in zip(parts, blocks.origin, blocks.extent, strict=True):
             whole[z : z + l, y : y + m, x : x + n] = part[:l, :m, :n]
@@ -132,12 +140,12 @@ def start(scene: Scene, threads: int = 1) -> Simulation:
 # ---- exact states ----------------------------------------------------------------------------------------------------
 
 
-def riemann_of(scene: Scene):
+def riemann_of(scene: Scene) -> tuple[RiemannSolution, float]:
     """The exact solution of a tube whose second region is right of a plane, and the plane's x [m]."""
-    right, left = scene.fluid.regions[1], scene.fluid.regions[0]
-    sides = [PureState(r.state.density, r.state.pressure, r.state.velocity[0]) for r in (left, right)]
-    eos = [scene.fluid.phases[r.state.phase].eos for r in (left, right)]
-    return exact_riemann(*sides, *eos), right.shape.point[0]
+    phases, (left, right) = present(scene.fluid).phases, present(scene.fluid).regions[:2]
+    side, other = (PureState(r.state.density, r.state.pressure, r.state.velocity[0]) for r in (left, right))
+    eos, other_eos = (cast(ExactEos, phases[r.state.phase].eos) for r in (left, right))
+    return exact_riemann(side, other, eos, other_eos), of_kind(HalfSpace, right.shape).point[0]
 
 
 def tube(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
@@ -149,8 +157,9 @@ def tube(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
 
 def slab(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
     """A slab that has moved through the whole domain: as at the start."""
-    outside, inside = (region.state for region in scene.fluid.regions)
-    box, x = scene.fluid.regions[1].shape, centers[0]
+    regions, x = present(scene.fluid).regions, centers[0]
+    outside, inside = (region.state for region in regions)
+    box = of_kind(Box, regions[1].shape)
     density = np.where((x > box.lower[0]) & (x < box.upper[0]), inside.density, outside.density)
     rows = np.ones((len(centers[1]), len(x)))
     return rows * density, rows * outside.velocity[0], rows * outside.pressure
@@ -165,10 +174,11 @@ def explosion(scene: Scene, centers: Sequence[np.ndarray]) -> Sequence[np.ndarra
 
 
 def _rings(scene: Scene) -> Rings:
-    water, gas = (PureState(r.state.density, r.state.pressure) for r in scene.fluid.regions)
-    eos_water, eos_gas = (scene.fluid.phases[r.state.phase].eos for r in scene.fluid.regions)
-    radius, side = scene.fluid.regions[1].shape.radius, scene.domain.upper[0]
-    eos = StiffenedGas(eos_gas.gamma, 0.0), eos_water
+    phases, regions = present(scene.fluid).phases, present(scene.fluid).regions
+    water, gas = (PureState(r.state.density, r.state.pressure) for r in regions)
+    eos_water, eos_gas = (phases[r.state.phase].eos for r in regions)
+    radius, side = of_kind(Ball, regions[1].shape).radius, scene.domain.upper[0]
+    eos = StiffenedGas(of_kind(IdealGas, eos_gas).gamma, 0.0), eos_water
     return _rings_of(gas, water, *eos, radius, side, scene.time.end, side / RINGS)
 
 

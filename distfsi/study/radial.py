@@ -97,4 +97,5 @@ def _velocity_jump(star: Array, gamma: Array, p_inf: Array, rho: Array, p: Array
     shock = (star - p) * root, root * (1.0 - 0.5 * (star - p) / (star + p_inf + B))
     ratio, power = (star + p_inf) / (p + p_inf), 0.5 * (gamma - 1.0) / gamma
     fan = 2.0 * c / (gamma - 1.0) * (ratio**power - 1.0), ratio ** (power - 1.0) * c / (gamma * (p + p_inf))
-    return tuple(np.where(star > p, a, b) for a, b in zip(shock, fan, strict=True))
+    jump, slope = (np.where(star > p, a, b) for a, b in zip(shock, fan, strict=True))
+    return jump, slope

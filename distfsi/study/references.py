@@ -7,9 +7,8 @@ from typing import NamedTuple
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
-from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
-from distfsi.study.exact import PureState
+from distfsi.study.exact import ExactEos, PureState
 
 AIR = IdealGas(gamma=1.4)
 WATER = StiffenedGas(gamma=4.4, p_inf=6.0e8)
@@ -106,8 +105,8 @@ class ShockTube(NamedTuple):
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
     p_star: float
     u_star: float
     shock: float
@@ -307,7 +306,7 @@ radial Lagrangian computation (Godunov, exact interfaces, 2000 cells per metre; 
 the highest pressure by 1 %)."""
 
 
-class Place(NamedTuple):
+class CentreAt(NamedTuple):
     """Where a body's centre is at a time, in the units of its input."""
 
     time: float
@@ -315,6 +314,6 @@ class Place(NamedTuple):
     y: float
 
 
-LIFTOFF = (Place(0.1641, 0.3602, 0.0830), Place(0.30085, 0.6400, 0.1459))
+LIFTOFF = (CentreAt(0.1641, 0.3602, 0.0830), CentreAt(0.30085, 0.6400, 0.1459))
 """The cylinder of inputs/liftoff.toml by an independent ghost-cell method of first order in the force, h = 0.0025; the
 mass is 1.2 % less."""

@@ -12,16 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
+from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import of_kind, present
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.output.fields import read_cells, series
 from distfsi.scene import load
-from distfsi.scene.description import Scene
+from distfsi.scene.description import Ball, HalfSpace, Scene
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.references import SHOCK_BUBBLE
-from distfsi.study.tracks import Line, Measure, Tracks, crossing, follow, velocity, write_tracks
+from distfsi.study.tracks import Line, Measure, Tracks, crossing, record_tracks, velocity, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "shock_bubble.toml"
+INPUT = shipped_inputs() / "shock_bubble.toml"
 DIRECTORY = Path("out/study_shock_bubble")
 GASES = {
     "pure": (),
@@ -46,20 +49,21 @@ VR and Vj need more than 100 cells across the bubble; Vs, VT and Vdi do not."""
 
 def bubble_of(scene: Scene) -> tuple[float, float]:
     """Upstream and downstream edge of the bubble at the start [mm]."""
-    ball = scene.fluid.regions[-1].shape
+    ball = of_kind(Ball, present(scene.fluid).regions[-1].shape)
     return ball.center[0] + ball.radius, ball.center[0] - ball.radius
 
 
 def arrival_of(scene: Scene) -> float:
     """When the incident shock meets the bubble [units of time of the input], exact."""
-    rest, shocked = scene.fluid.regions[0].state, scene.fluid.regions[1].state
+    outer, inner = present(scene.fluid).regions[:2]
+    rest, shocked, edge = outer.state, inner.state, of_kind(HalfSpace, inner.shape)
     speed = shocked.density * abs(shocked.velocity[0]) / (shocked.density - rest.density)
-    return (scene.fluid.regions[1].shape.point[0] - bubble_of(scene)[0]) / speed
+    return (edge.point[0] - bubble_of(scene)[0]) / speed
 
 
 def measure_of(simulation: Simulation) -> Measure:
     """What is followed: shocks on the axis and at the wall, where helium begins and ends on the axis and anywhere."""
-    domain, fluid = simulation.scene.domain, simulation.fluid
+    domain, fluid = simulation.scene.domain, present(simulation.fluid)
     (left, right), (low, high) = zip(domain.lower, domain.upper, strict=True)
     h, middle = domain.spacing, 0.5 * (low + high)
     edges, points = (left + 0.5 * h[0], right - 0.5 * h[0]), domain.cells[0]
@@ -76,13 +80,13 @@ def measure_of(simulation: Simulation) -> Measure:
             "shock on the axis": crossing(x, on_axis["pressure"], FRONT),
             "upstream interface": crossing(x[::-1], helium[::-1], 0.5),
             "downstream interface": crossing(x, helium, 0.5),
-            "rearmost helium": float(simulation.communicator.maximum([anywhere])[0]),
+            "rearmost helium": float(simulation.communicator.maximum(np.array([anywhere]))[0]),
         }
 
     return measure
 
 
-def _rearmost(fluid) -> float:
+def _rearmost(fluid: Fluid) -> float:
     """Largest x of the centers of this rank's cells that are half helium or more; -inf if none is."""
     largest = -np.inf
     for block in range(fluid.blocks.local_count):
@@ -123,7 +127,8 @@ def run_gas(communicator: Communicator, gas: str, overrides: Sequence[str]) -> t
     scene = load(INPUT, settings)
     start = arrival_of(scene)
     pictures = [start + time / MICROSECONDS for time in MAP_TIMES + SCHLIEREN_TIMES]
-    return scene, in_microseconds(follow(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, pictures), scene)
+    tracks = record_tracks(scene, communicator, measure_of, STEPS_BETWEEN_SAMPLES, pictures)
+    return scene, in_microseconds(tracks, scene)
 
 
 # ---- what is shown ---------------------------------------------------------------------------------------------------
@@ -144,9 +149,12 @@ def tracks_chart(gas: str, tracks: Tracks) -> Chart:
     return Chart(f"{gas} helium", "x [mm]", "time after the shock has met the bubble [us]", curves)
 
 
-def pictures_at(scene: Scene, times: Sequence[float]) -> list[tuple[str, Mapping[str, np.ndarray], tuple]]:
+Shown = tuple[str, Mapping[str, np.ndarray], tuple[float, float, float, float]]
+
+
+def pictures_at(scene: Scene, times: Sequence[float]) -> list[Shown]:
     """Title, fields and extent [mm] of the field files nearest to `times` [us] of a run that got that far."""
-    start, found = arrival_of(scene), []
+    start, found = arrival_of(scene), list[Shown]()
     files = [((time - start) * MICROSECONDS, path) for time, path in series(Path(scene.output.directory), "cells")]
     for wanted in times:
         near = [(time, path) for time, path in files if abs(time - wanted) < 1.0]

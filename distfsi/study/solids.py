@@ -5,17 +5,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import of_kind, present
 from distfsi.scene import load
 from distfsi.scene.description import Box, Cylinder, Tube
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 
-INPUTS = Path(__file__).parents[2] / "inputs"
+INPUTS = shipped_inputs()
 
 
 @dataclass(frozen=True)
@@ -61,14 +63,14 @@ class Problem:
 
 def by_id(simulation: Simulation) -> dict[str, np.ndarray]:
     """The particles in the order of their ids."""
-    columns = simulation.solid.columns
+    columns = present(simulation.solid).columns
     order = np.argsort(columns["id"])
     return {name: column[order] for name, column in columns.items()}
 
 
 def energy(simulation: Simulation) -> float:
     """Kinetic plus internal energy [J]."""
-    totals = simulation.solid.totals()
+    totals = present(simulation.solid).totals()
     return totals["kinetic"] + totals["internal"]
 
 
@@ -130,8 +132,9 @@ def flyer(simulation: Simulation) -> list[Figure]:
 
 def taylor(simulation: Simulation) -> list[Figure]:
     """Length of the bar and radius of its foot at the end, of the surfaces beyond the outermost particles."""
-    bar: Cylinder = simulation.scene.solid.bodies[0].shape
-    before, start, spacing = energy(simulation), by_id(simulation)["position"], simulation.scene.solid.bodies[0].spacing
+    body = present(simulation.scene.solid).bodies[0]
+    bar, spacing = of_kind(Cylinder, body.shape), body.spacing
+    before, start = energy(simulation), by_id(simulation)["position"]
     from_axis, along = np.hypot(*start.T[1:]), np.unique(start[:, 0].round(9))
     top, foot = (np.isclose(start[:, 0], along[layer]) for layer in (-1, 0))
     rim = np.flatnonzero(foot & (from_axis > from_axis[foot].max() - 0.25 * spacing))
@@ -163,17 +166,17 @@ def carried(start: np.ndarray, now: np.ndarray, particles: np.ndarray, points: n
 
 def verney(simulation: Simulation) -> list[Figure]:
     """Least inner radius of the imploding shell (exact for an incompressible one)."""
-    shell: Tube = simulation.scene.solid.bodies[0].shape
+    shell = of_kind(Tube, present(simulation.scene.solid).bodies[0].shape)
     before, radius = energy(simulation), np.hypot(*by_id(simulation)["position"].T)
     inner = np.isclose(radius, radius.min())
     inset = (
         radius[inner].mean() ** 2 - shell.inner_radius**2
     )  # times pi: area within the innermost particles, which stays
-    least = np.inf
+    smallest = np.inf
     while not simulation.done:
         simulation.step()
-        least = min(least, np.hypot(*by_id(simulation)["position"][inner].T).mean() ** 2 - inset)
-    return [Figure("least inner radius [m]", float(np.sqrt(least)), 40e-3, 0.01), kept_energy(simulation, before)]
+        smallest = min(smallest, np.hypot(*by_id(simulation)["position"][inner].T).mean() ** 2 - inset)
+    return [Figure("least inner radius [m]", float(np.sqrt(smallest)), 40e-3, 0.01), kept_energy(simulation, before)]
 
 
 # ---- bending ---------------------------------------------------------------------------------------------------------
@@ -183,12 +186,12 @@ CLAMPED = 1.875104068711961  # k L of the first mode
 
 def cantilever(simulation: Simulation) -> list[Figure]:
     """Period of a plate's first mode from two zero crossings of its tip (Timoshenko's value; Gray et al. 2001)."""
-    body = simulation.scene.solid.bodies[0]
-    shape: Box = body.shape
-    columns = simulation.solid.columns
+    body = present(simulation.scene.solid).bodies[0]
+    shape = of_kind(Box, body.shape)
+    columns = present(simulation.solid).columns
     x = columns["position"][:, 0]
     mode = bending_mode(np.clip(x / shape.upper[0], 0.0, 1.0))
-    speed = (body.eos.bulk_modulus / body.density) ** 0.5
+    speed = (of_kind(LinearEos, body.eos).bulk_modulus / body.density) ** 0.5
     columns["velocity"][:, 1] = np.where(columns["fixed"], 0.0, 0.01 * speed * mode)
     tip = by_id(simulation)["position"][:, 0] > shape.upper[0] - body.spacing
     rest, before, heights, times = by_id(simulation)["position"][tip, 1].mean(), energy(simulation), [0.0], [0.0]
@@ -196,21 +199,21 @@ def cantilever(simulation: Simulation) -> list[Figure]:
         simulation.step()
         heights.append(by_id(simulation)["position"][tip, 1].mean() - rest)
         times.append(simulation.time)
-    heights = np.array(heights)
-    down = 1 + np.flatnonzero((heights[1:-1] > 0.0) & (heights[2:] <= 0.0))[0]
-    crossing = times[down] + heights[down] / (heights[down] - heights[down + 1]) * (times[down + 1] - times[down])
+    y = np.array(heights)
+    down = 1 + np.flatnonzero((y[1:-1] > 0.0) & (y[2:] <= 0.0))[0]
+    crossing = times[down] + y[down] / (y[down] - y[down + 1]) * (times[down + 1] - times[down])
     return [Figure("period [s]", 2.0 * crossing, 0.2565, 0.02), kept_energy(simulation, before)]
 
 
 def bending_mode(s: np.ndarray) -> np.ndarray:
     """First mode of a clamped beam at s = x/L, 1 at the tip."""
 
-    def shape(s):
+    def shape(s: np.ndarray) -> np.ndarray:
         k = CLAMPED * s
         ratio = (np.cosh(CLAMPED) + np.cos(CLAMPED)) / (np.sinh(CLAMPED) + np.sin(CLAMPED))
         return np.cosh(k) - np.cos(k) - ratio * (np.sinh(k) - np.sin(k))
 
-    return shape(s) / shape(1.0)
+    return shape(s) / shape(np.array(1.0))
 
 
 PISTON = Problem("piston", "Elastic-plastic piston", "piston.toml", piston, "bar", (2e-4, 1e-4, 5e-5))

@@ -68,9 +68,11 @@ class Stability:
                     print(self._summary(name, found), flush=True)
                     numbers = np.array([[found[r, c][0] for c in shown.columns] for r in shown.rows])
                     sheets.append(VerdictMap(name, numbers))
-                    lines += [[shown.name, name, f"{r:g}", f"{c:.3g}", *self._told(v)] for (r, c), v in found.items()]
-                names = ([f"{v:.3g}" for v in values] for values in (shown.rows, shown.columns))
-                labels = zip((shown.row_label, shown.column_label), names, strict=True)
+                    lines += [
+                        [shown.name, name, f"{r:g}", f"{c:.3g}", *self._in_words(v)] for (r, c), v in found.items()
+                    ]
+                rows, columns = ([f"{v:.3g}" for v in values] for values in (shown.rows, shown.columns))
+                labels = (shown.row_label, rows), (shown.column_label, columns)
                 draw_verdicts(
                     self.directory / f"{shown.name}.png", shown.title, sheets, *labels, self.verdicts, across=2
                 )
@@ -87,5 +89,5 @@ class Stability:
         bad = [f"{r:g} by {c:g}: {why}" for (r, c), (number, why) in found.items() if number]
         return f"  {name:20} {counts}" + "".join(f"\n      {text}" for text in bad[:6])
 
-    def _told(self, verdict: Verdict) -> tuple[str, str]:
+    def _in_words(self, verdict: Verdict) -> tuple[str, str]:
         return list(self.verdicts)[verdict[0]], verdict[1]

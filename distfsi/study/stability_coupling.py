@@ -13,14 +13,17 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.errors import Diverged
+from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene.description import (
     Ball,
     Body,
     Box,
     Coupling,
+    CouplingScheme,
     Domain,
     Fluid,
     FluidState,
@@ -40,26 +43,26 @@ from distfsi.study.references import AIR, STEEL, STEEL_DENSITY, WATER
 from distfsi.study.stability import Map, Stability, Verdict, corners
 
 DIRECTORY = Path("out/study_stability_coupling")
-SCHEMES = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}
+SCHEMES: dict[str, CouplingScheme] = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}
 SURVIVED, RANG, LEAKED, FAILED = range(4)
 VERDICTS = {"survived": "tab:green", "rang": "tab:olive", "leaked": "tab:orange", "failed": "tab:red"}
 CFL = (0.1, 0.5, 0.9)
 CELLS, ACROSS = 50, 24  # cells along a tube; across the box of a shell
 SWINGS = 1.2  # total variation of the body's velocity over its range
 LEAK = 1e-9  # of the mass behind the wall
-MOST_STEPS = 4000
+MAXIMUM_STEPS = 4000
 
 
 def scene_of(
-    scheme: str,
+    scheme: CouplingScheme,
     cfl: float,
-    eos,
+    eos: FluidEos,
     regions: Sequence[tuple[PureState, Shape | None]],
     body: Body,
-    lower,
-    upper,
-    cells,
-    end,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+    cells: tuple[int, ...],
+    end: float,
 ) -> Scene:
     """A body in one gas or liquid, in a closed box."""
     D = len(cells)
@@ -68,7 +71,7 @@ def scene_of(
     ]
     fluid = Fluid((Phase("fluid", eos),), tuple(states), "minmod", 1e-6, ((None, None),) * D, "float64")
     return Scene(
-        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), (0.0,) * D, fluid,
+        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), fluid,
         Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((CELLS,) * D, (CELLS,) * D),
         coupling=Coupling(scheme),
     )  # fmt: skip
@@ -77,13 +80,13 @@ def scene_of(
 def judge(scene: Scene, leaked: Callable[[Simulation], float], moves: bool = True) -> Verdict:
     """Run a scene; what becomes of it. `leaked` tells the mass behind the wall; only what moves can ring."""
     simulation = Simulation.of(scene, Communicator(), 1)
-    before, velocity = leaked(simulation), [0.0]
+    solid, before, velocity = present(simulation.solid), leaked(simulation), [0.0]
     try:
         while not simulation.done:
             simulation.step()
-            totals = simulation.solid.totals()
+            totals = solid.totals()
             velocity.append(totals["momentum"][0] / totals["mass"])
-            if simulation.steps > MOST_STEPS:
+            if simulation.steps > MAXIMUM_STEPS:
                 return FAILED, "the time step shrinks"
         simulation.check()
     except Diverged as error:
@@ -97,14 +100,19 @@ def judge(scene: Scene, leaked: Callable[[Simulation], float], moves: bool = Tru
 
 def mass_beyond(simulation: Simulation, inside: Callable[[Sequence[np.ndarray]], np.ndarray]) -> float:
     """Mass [kg] in the cells of the only block whose centers (x, y) are `inside`."""
-    fluid, blocks = simulation.fluid, simulation.blocks
-    density = fluid.cells(0)[0] * fluid.active(simulation.coupling.volume, 0)
+    fluid, blocks = present(simulation.fluid), simulation.blocks
+    density = fluid.cells(0)[0] * fluid.active(present(simulation.coupling).volume, 0)
     x, y, _ = blocks.cell_centers(0)
     grid = np.meshgrid(np.asarray(y), np.asarray(x), indexing="ij")[::-1]
     return float(density[0][inside(grid)].sum())
 
 
-def pushed(scheme: str, ratio: float, cfl: float) -> Verdict:
+def fluid_mass(simulation: Simulation) -> float:
+    """Mass [kg] of the fluid."""
+    return float(present(simulation.fluid).totals(present(simulation.coupling).volume)[0][0])
+
+
+def pushed(scheme: CouplingScheme, ratio: float, cfl: float) -> Verdict:
     """A plate two cells thick, so many times as dense as the gas, pressed by 10 : 1."""
     h = 1.0 / CELLS
     plate = Body(
@@ -113,10 +121,10 @@ def pushed(scheme: str, ratio: float, cfl: float) -> Verdict:
     regions = [(PureState(1.0, 1.0), None), (PureState(1.0, 10.0), Box((0.0,), (0.4 + h,)))]
     end = min(0.3, 0.02 * sqrt(ratio))
     scene = scene_of(scheme, cfl, AIR, regions, plate, (0.0,), (1.0,), (CELLS,), end)
-    return judge(scene, lambda s: float(s.fluid.totals(s.coupling.volume)[0][0]))
+    return judge(scene, fluid_mass)
 
 
-def shell(scheme: str, ratio: float, thickness: float) -> Verdict:
+def shell(scheme: CouplingScheme, ratio: float, thickness: float) -> Verdict:
     """A heavy ring, its wall so many cells thick, around gas of so many times the pressure outside."""
     h, radius = 1.0 / ACROSS, 0.3
     spacing = min(0.5, thickness) * h
@@ -133,17 +141,17 @@ def shell(scheme: str, ratio: float, thickness: float) -> Verdict:
     return judge(scene, lambda s: mass_beyond(s, lambda x: np.hypot(x[0] - 0.5, x[1] - 0.5) > middle), moves=False)
 
 
-def hit(scheme: str, pressure: float, cfl: float) -> Verdict:
+def hit(scheme: CouplingScheme, pressure: float, cfl: float) -> Verdict:
     """A shock in water of so many pascals hits a steel plate of ten cells in water."""
     h, ahead = 1.0 / CELLS, PureState(1000.0, 1e5)
     behind = wave_into(ahead, WATER, pressure, RIGHTWARD).behind
     plate = Body("plate", Box((0.4,), (0.5,)), 0.5 * h, STEEL_DENSITY, (0.0,), STEEL, NoStrength(), None)
     regions = [(ahead, None), (behind, Box((0.0,), (0.35,)))]
     scene = scene_of(scheme, cfl, WATER, regions, plate, (0.0,), (1.0,), (CELLS,), 5e-5)
-    return judge(scene, lambda s: float(s.fluid.totals(s.coupling.volume)[0][0]))
+    return judge(scene, fluid_mass)
 
 
-def carried(scheme: str, ratio: float, cfl: float) -> Verdict:
+def carried(scheme: CouplingScheme, ratio: float, cfl: float) -> Verdict:
     """A wave in water takes along a plate two cells thick, so many times as dense as the water on both its sides."""
     h, ahead = 1.0 / CELLS, PureState(1000.0, 1e5)
     behind = wave_into(ahead, WATER, 1e6, RIGHTWARD).behind
@@ -153,7 +161,7 @@ def carried(scheme: str, ratio: float, cfl: float) -> Verdict:
     )
     regions = [(ahead, None), (behind, Box((0.0,), (0.35,)))]
     scene = scene_of(scheme, cfl, WATER, regions, plate, (0.0,), (1.0,), (CELLS,), 2e-4)
-    return judge(scene, lambda s: float(s.fluid.totals(s.coupling.volume)[0][0]))
+    return judge(scene, fluid_mass)
 
 
 MAPS = (

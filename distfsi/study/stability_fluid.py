@@ -2,7 +2,7 @@
 
 Every run is a tube of few cells until its fastest wave has gone most of the way to an end. It has survived when it
 reaches the end with a valid state in every cell; with help, if fluxes were limited or steps redone on the way. What
-survives but swings (its velocity varies much more along the tube than the exact one) is told apart.
+survives but swings (its velocity varies much more along the tube than the exact one) counts as a case of its own.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.errors import Diverged, InputError
 from distfsi.laws.fluid.ideal_gas import IdealGas
-from distfsi.laws.law import FluidEos
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.verdicts import VerdictMap, draw_verdicts
 from distfsi.scene import load
 from distfsi.scene.description import FluidState, HalfSpace, Phase, Region, Scene
 from distfsi.simulation import Simulation
 from distfsi.study.choices import Method, name_of, settings, varied_alone
-from distfsi.study.exact import RIGHTWARD, Material, PureState, exact_riemann, wave_into
+from distfsi.study.exact import RIGHTWARD, ExactEos, Material, PureState, exact_riemann, wave_into
 from distfsi.study.problems import INPUTS, centers, fields, start
 from distfsi.study.references import AIR, WATER
 from distfsi.study.stability import Plane
@@ -35,7 +35,7 @@ from distfsi.study.stability import Plane
 DIRECTORY = Path("out/study_stability_fluid")
 CELLS = 50
 WAY = 0.4  # that the fastest wave goes, in lengths of the tube
-MOST_STEPS = 20.0  # times those that the fastest wave should need
+MAXIMUM_STEPS = 20.0  # times those that the fastest wave should need
 SWINGS = 1.5  # total variation of the velocity over the exact one
 HELIUM = IdealGas(5.0 / 3.0)
 
@@ -55,8 +55,8 @@ class Tube:
 
     left: PureState
     right: PureState
-    eos_left: FluidEos
-    eos_right: FluidEos
+    eos_left: ExactEos
+    eos_right: ExactEos
 
 
 @dataclass(frozen=True)
@@ -157,25 +157,25 @@ def scene_of(tube: Tube, cfl: float, method: Method) -> Scene:
         base,
         domain=replace(base.domain, cells=(CELLS,)),
         time=replace(base.time, end=WAY / fastest_wave(tube), cfl=cfl),
-        fluid=replace(base.fluid, phases=phases, regions=regions),
+        fluid=replace(present(base.fluid), phases=phases, regions=regions),
     )
 
 
 def judge(tube: Tube, cfl: float, method: Method) -> Verdict:
     """Run a tube; what becomes of it."""
     simulation = start(scene_of(tube, cfl, method))
-    most = MOST_STEPS * WAY * CELLS / cfl
+    limit = MAXIMUM_STEPS * WAY * CELLS / cfl
     try:
         while not simulation.done:
             simulation.step()
-            if simulation.steps > most:
+            if simulation.steps > limit:
                 return Verdict(FAILED, "the time step shrinks")
         simulation.check()
     except Diverged as error:
         return Verdict(FAILED, _cause(error))
     if _swings(simulation, tube):
         return Verdict(SWUNG)
-    faces, redone = simulation.fluid.limited_faces(), simulation.rejected_steps
+    faces, redone = present(simulation.fluid).limited_faces(), present(simulation.fluid).rejected_steps
     return Verdict(HELPED, f"{faces} limited faces; {redone} redone steps") if faces or redone else Verdict(SURVIVED)
 
 
@@ -237,8 +237,8 @@ def write(found: Mapping[str, Mapping[str, list[list[Verdict]]]], maps: Sequence
             for method, rows in found[shown.name].items():
                 for value, row in zip(shown.rows, rows, strict=True):
                     for column, verdict in zip(shown.columns, row, strict=True):
-                        place = (f"{value:g}", f"{column:g}", f"{shown.cfl_of(column):g}")
-                        table.writerow([shown.name, method, *place, names[verdict.number], verdict.why])
+                        at = (f"{value:g}", f"{column:g}", f"{shown.cfl_of(column):g}")
+                        table.writerow([shown.name, method, *at, names[verdict.number], verdict.why])
 
 
 def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
@@ -252,10 +252,12 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, [{}, *varied_alone()], MAPS, overrides)
 
 
-def _study(communicator, methods, maps, overrides) -> None:
+def _study(
+    communicator: Communicator, methods: Sequence[Method], maps: Sequence[Map], overrides: Sequence[str]
+) -> None:
     if communicator.size > 1 or overrides:
         raise InputError(["study stability fluid: runs on one rank and takes no overrides"])
-    found = {}
+    found: dict[str, dict[str, list[list[Verdict]]]] = {}
     with threadpool_limits(1):
         for shown in maps:
             print(f"\n{shown.title}: {shown.row_label} by {shown.column_label}")

@@ -19,6 +19,7 @@ from distfsi.errors import Diverged
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene.description import Body, Box, Domain, Output, Performance, Scene, Solid, Time
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
@@ -50,7 +51,7 @@ def scene_of(form: Form, bodies: Sequence[Body], size: float) -> Scene:
     """Bodies in a box that reaches `size` [m] to all sides."""
     lower, upper = (-size, -size), (size, size)
     return Scene(
-        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None), (0.0, 0.0),
+        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None),
         None, Solid(tuple(bodies), 1.3, 0.5, 1.0, **form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
     )  # fmt: skip
 
@@ -62,7 +63,7 @@ def plate(name: str, lower: tuple[float, float], upper: tuple[float, float], spa
 
 def advance(simulation: Simulation, end: float, factor: float = 1.0) -> tuple[int, str]:
     """Run to `end` [s] with the stable step times `factor`; FAILED and why, or SURVIVED."""
-    solid = simulation.solid
+    solid = present(simulation.solid)
     before, time, first = energy(simulation), 0.0, 0.0
     try:
         while time < end:
@@ -95,18 +96,19 @@ def stretched(form: Form, strain: float, through: float) -> tuple[int, str]:
     half = 0.5 * through * spacing
     body = plate("plate", (-0.5 * WIDTH, -half), (0.5 * WIDTH, half), spacing, 0.0)
     simulation = Simulation.of(scene_of(form, [body], 20.0 * WIDTH), Communicator(), 1)
-    c = simulation.solid.columns
+    solid = present(simulation.solid)
+    c = solid.columns
     start = c["position"].copy()
     c["velocity"] = np.stack([rate * c["position"][:, 0], np.zeros(len(start))], axis=1)
     c["fixed"] = np.abs(start[:, 0]) > 0.5 * WIDTH - 2.6 * spacing
     verdict, why = advance_driven(simulation, strain / rate)
     if verdict != SURVIVED:
         return verdict, why
-    bonded = simulation.solid.pieces()
+    bonded = solid.pieces()
     if bonded is not None:
         found = len(bonded["piece"])
     else:
-        found = pieces(simulation.solid.columns["position"], np.array([1.0 + strain, 1.0]), spacing)
+        found = pieces(solid.columns["position"], np.array([1.0 + strain, 1.0]), spacing)
     return (SURVIVED, "") if found == 1 else (BROKEN, f"{found} pieces")
 
 
@@ -116,7 +118,7 @@ def advance_driven(simulation: Simulation, end: float) -> tuple[int, str]:
     verdict, why = advance(simulation, end)
     if verdict != LEAKED:
         return verdict, why
-    drift = abs((energy(simulation) - simulation.solid.gravity_work()) / before - 1.0)
+    drift = abs((energy(simulation) - present(simulation.solid).gravity_work()) / before - 1.0)
     return (SURVIVED, "") if drift < 1e-8 else (LEAKED, f"energy {drift:.1e}")
 
 

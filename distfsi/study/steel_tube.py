@@ -16,15 +16,17 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.run import run
 from distfsi.scene import load
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.study.references import STEEL_TUBE, STEEL_TUBE_JOHNSON_COOK, STEEL_TUBE_PLASTIC, TubeStrength
 
 DIRECTORY = Path("out/study_steel_tube")
-INPUT = Path(__file__).parents[2] / "inputs" / "steel_tube.toml"
+INPUT = shipped_inputs() / "steel_tube.toml"
 WIDE = (  # room for 60 us; eight particles across the wall; with strength it has begun to neck by 40 us
     "solid.form=total_lagrangian",
     "domain.upper=[0.14,0.14]",
@@ -65,7 +67,9 @@ def walls(directory: Path) -> list[Wall]:
     return [_wall(time, path, cells[time], first, last, spacing, rings) for time, path in frames]
 
 
-def _wall(time, path, cells, first, last, spacing, rings) -> Wall:
+def _wall(
+    time: float, path: Path, cells: Path, first: np.ndarray, last: np.ndarray, spacing: float, rings: np.ndarray
+) -> Wall:
     particles = _by_id(read_particles(path)[1])
     x, v = particles["position"][:, :2], particles["velocity"][:, :2]
     r = np.hypot(*x.T)
@@ -126,7 +130,7 @@ class Expansion:
     time: np.ndarray
     kinetic: np.ndarray
 
-    def lost(self, whole: Expansion, time: float | np.ndarray) -> float | np.ndarray:
+    def lost(self, whole: Expansion, time: np.ndarray) -> np.ndarray:
         """Share of the kinetic energy that this wall lacks beside a `whole` one without strength."""
         return 1.0 - np.interp(time, self.time, self.kinetic) / np.interp(time, whole.time, whole.kinetic)
 
@@ -139,7 +143,8 @@ def expand(communicator: Communicator, name: str, overrides: Sequence[str]) -> E
     if communicator.rank > 0:
         return None
     history = read_history(directory / "history.csv")
-    return Expansion(walls(directory), history["time [s]"], history["solid kinetic energy [J]"])
+    time, kinetic = (np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J]"))
+    return Expansion(walls(directory), time, kinetic)
 
 
 def losses(name: str, found: Expansion, whole: Expansion) -> str:
@@ -151,7 +156,7 @@ def losses(name: str, found: Expansion, whole: Expansion) -> str:
             lines.append(
                 f"{1e6 * wall.time:5.1f} us  {1e3 * wall.inner_radius:6.2f} ({1e3 * reference.inner_radius:6.2f})"
                 f"      {wall.velocity:5.0f} ({reference.mean_velocity:5.0f})"
-                f"      {100 * found.lost(whole, wall.time):5.2f} ({100 * reference.loss:5.2f})"
+                f"      {100 * found.lost(whole, np.array(wall.time)):5.2f} ({100 * reference.loss:5.2f})"
             )
     return "\n".join(lines)
 
@@ -179,9 +184,10 @@ def charts(found: dict[str, Expansion]) -> list[Chart]:
 
 def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     """Run the tube without and with strength; print all beside the references, and leave charts in DIRECTORY."""
-    found = {name: expand(communicator, name, overrides) for name in STRENGTHS}
+    runs = {name: expand(communicator, name, overrides) for name in STRENGTHS}
     if communicator.rank > 0:
         return
+    found = {name: present(tube) for name, tube in runs.items()}
     whole = next(iter(found.values()))
     for name, tube in found.items():
         print(f"\n{name} (in brackets: 1-D reference without strength)\n{table(tube.walls)}")

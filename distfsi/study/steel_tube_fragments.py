@@ -7,7 +7,7 @@ steel; the paper names none. Those of the paper and of the experiment it compare
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,19 +133,25 @@ def maps(directory: Path, what: str) -> list[Picture]:
     return pictures
 
 
-def _drawn(cells, particles, lower, spacing, what) -> np.ndarray:
+def _drawn(
+    cells: Mapping[str, np.ndarray],
+    particles: Mapping[str, np.ndarray],
+    lower: np.ndarray,
+    spacing: np.ndarray,
+    what: str,
+) -> np.ndarray:
     """Speeds of gas and wall, or the colors of the fragments, in the cells."""
     x = particles["position"][:, :2]
-    place = tuple(((x - np.array(lower[:2])) / np.array(spacing[:2])).astype(int).T[::-1])
+    cell = tuple(((x - lower[:2]) / spacing[:2]).astype(int).T[::-1])
     speed = np.linalg.norm(cells["velocity"][0], axis=-1)
     if what == "speed":
-        speed[place] = np.hypot(*particles["velocity"][:, :2].T)
+        speed[cell] = np.hypot(*particles["velocity"][:, :2].T)
         return speed
     numbers = np.full(speed.shape, np.nan)
     pieces, count = np.unique(particles["piece"], return_counts=True)
     large = count >= SMALLEST
     color = np.where(large, 5 + 7 * np.cumsum(large) % 20, 0)  # neighbours far from each other, dust alike
-    numbers[place] = color[np.searchsorted(pieces, particles["piece"])]
+    numbers[cell] = color[np.searchsorted(pieces, particles["piece"])]
     return numbers
 
 
@@ -172,7 +178,7 @@ def energies(directory: Path) -> Chart:
     """Energy of the quarter of the tube (after the paper's Fig. 27)."""
     history = read_history(directory / "history.csv")
     time, kinetic, internal = (
-        history[name] for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
+        np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
     )
     curves = [
         Curve(1e6 * time, 1e-6 * values, name)

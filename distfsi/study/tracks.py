@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.fields import FieldWriter
 from distfsi.output.progress import Progress
 from distfsi.scene.description import Scene
@@ -30,7 +31,7 @@ class Line:
     def __init__(self, simulation: Simulation, start: Sequence[float], end: Sequence[float], points: int):
         positions = np.linspace(start, end, points)
         self.distance = np.linalg.norm(positions - positions[0], axis=1)
-        self._sampler = FluidSampler(simulation.fluid, simulation.coupling, positions)
+        self._sampler = FluidSampler(present(simulation.fluid), simulation.coupling, positions)
 
     def values(self) -> dict[str, np.ndarray]:
         """Collective. Pressure, density, velocity components and volume fraction of the first phase at the points."""
@@ -56,7 +57,7 @@ def velocity(time: np.ndarray, position: np.ndarray, window: tuple[float, float]
     return float(np.polyfit(time[inside], position[inside], 1)[0]) if covered and inside.sum() > 2 else np.nan
 
 
-def update_geometry(
+def record_tracks(
     scene: Scene,
     communicator: Communicator,
     measure_of: Callable[[Simulation], Measure],

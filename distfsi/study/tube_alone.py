@@ -18,9 +18,11 @@ from distfsi.errors import InputError
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
 from distfsi.laws.solid.scatter import Scatter
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.scene import load
-from distfsi.scene.description import Solid
+from distfsi.scene.description import Solid as SolidOfScene
 from distfsi.simulation import Simulation
+from distfsi.solid.solid import Solid
 from distfsi.study.references import STEEL_TUBE
 from distfsi.study.steel_tube import INPUT
 
@@ -28,7 +30,7 @@ DIRECTORY = Path("out/study_tube_alone")
 TIMES = (0.0, *(instant.time for instant in STEEL_TUBE))  # s
 PRESSURES = (7.178e9, *(instant.gas_pressure for instant in STEEL_TUBE))  # Pa; first: products that meet steel
 SPACING, SEEDS = 0.5e-3, 3
-TOUGHNESS = 48e3  # J/m2: of 100 MPa m^(1/2)
+FRACTURE_ENERGY = 48e3  # J/m2: of 100 MPa m^(1/2)
 TABULATED = (0.05, 3.44, -2.12, 0.002, 0.61)  # Johnson & Cook 1985, 4340 steel
 MEASURED = (7.86e-3, 3.3e-3)  # m: width and thickness of the fragments found by Tang, Gu & Li 2003
 HEADER = (
@@ -72,19 +74,20 @@ class Burst:
 def tube(constants: Sequence[float], seed: int) -> Simulation:
     """A quarter of the tube, with Johnson and Cook's D1 to D5 of failure."""
     scene = load(INPUT)
-    failure = JohnsonCookFailure(*constants, 1.0, None, TOUGHNESS, Scatter(20.0, 1e-3, seed))
-    body = replace(scene.solid.bodies[0], spacing=SPACING, failure=failure)
-    return Simulation.of(replace(scene, fluid=None, solid=Solid((body,), 1.3, 0.5, 1.0)), Communicator(), 1)
+    D1, D2, D3, D4, D5 = constants
+    failure = JohnsonCookFailure(D1, D2, D3, D4, D5, 1.0, None, FRACTURE_ENERGY, Scatter(20.0, 1e-3, seed))
+    body = replace(present(scene.solid).bodies[0], spacing=SPACING, failure=failure)
+    return Simulation.of(replace(scene, fluid=None, solid=SolidOfScene((body,), 1.3, 0.5, 1.0)), Communicator(), 1)
 
 
 def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
     """Push the inner surface outward until `end` [s]."""
-    solid, time = tube(constants, seed).solid, 0.0
+    solid, time = present(tube(constants, seed).solid), 0.0
     start = np.hypot(*solid.columns["position"].T)
     inmost = solid.columns["id"][start < start.min() + 0.25 * SPACING]
     inset = start.min() ** 2 - 30e-3**2  # times pi: area inside the inmost particles, which stays
     first_failure = first_break = break_time = math.nan
-    most = 1
+    pieces = 1
     while time < end:
         solid.prepare()
         dt = solid.time_step()[0]
@@ -100,16 +103,16 @@ def burst(constants: Sequence[float], seed: int, end: float) -> Burst:
         if math.isnan(first_failure) and (solid.columns["damage"] >= 1.0).any():
             first_failure = radius / 30e-3
         if not math.isnan(first_failure):
-            most = max(most, _pieces(solid))
-        if math.isnan(first_break) and most > 1:
+            pieces = max(pieces, _pieces(solid))
+        if math.isnan(first_break) and pieces > 1:
             first_break, break_time = radius / 30e-3, time
     totals = solid.totals()
     velocity = math.sqrt(2.0 * totals["kinetic"] / totals["mass"])
-    return Burst(first_failure, first_break, break_time, 4.0 * (most - 1) if most > 1 else math.nan, velocity)
+    return Burst(first_failure, first_break, break_time, 4.0 * (pieces - 1) if pieces > 1 else math.nan, velocity)
 
 
-def _pieces(solid) -> int:
-    return int((solid.pieces()["particles"] >= DUST).sum())
+def _pieces(solid: Solid) -> int:
+    return int((present(solid.pieces())["particles"] >= DUST).sum())
 
 
 def scaled(share: float) -> tuple[float, ...]:
@@ -131,7 +134,7 @@ def main(communicator: Communicator, overrides: Sequence[str]) -> None:
     _study(communicator, overrides, tuple(CASES), SEEDS)
 
 
-def _study(communicator, overrides, cases, seeds) -> None:
+def _study(communicator: Communicator, overrides: Sequence[str], cases: Sequence[str], seeds: int) -> None:
     if communicator.size > 1 or overrides:
         raise InputError(["study tube_alone: runs on one rank and takes no overrides"])
     DIRECTORY.mkdir(parents=True, exist_ok=True)
@@ -140,19 +143,19 @@ def _study(communicator, overrides, cases, seeds) -> None:
         f"measured fragments: {1e3 * width:.2f} mm wide, {1e3 * thickness:.2f} mm thick, which the wall is at r/r0 1.24"
     )
     with threadpool_limits(1), (DIRECTORY / "bursts.csv").open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(HEADER)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADER)
         for name in cases:
             share, end = CASES[name]
             found = [burst(scaled(share), seed, end) for seed in range(1, seeds + 1)]
             for seed, b in enumerate(found, 1):
                 numbers = (b.first_failure, b.first_break, b.break_time, b.thickness, b.pieces, b.width, b.velocity)
-                table.writerow([share, seed, *(f"{n:.4g}" for n in numbers)])
-            print(told(name, found), flush=True)
+                writer.writerow([share, seed, *(f"{n:.4g}" for n in numbers)])
+            print(table(name, found), flush=True)
     print(f"\ntable in {DIRECTORY}", flush=True)
 
 
-def told(name: str, found: Sequence[Burst]) -> str:
+def table(name: str, found: Sequence[Burst]) -> str:
     """Means over the seeds; those of a break over the seeds that broke."""
     mean = _mean(found, "first_failure", "velocity")
     start = (

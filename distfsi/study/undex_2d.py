@@ -10,15 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import of_kind, present
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.output.fields import read_cells, series
 from distfsi.scene import load
-from distfsi.scene.description import Scene
+from distfsi.scene.description import Ball, Scene
+from distfsi.scene.shipped import shipped_inputs
 from distfsi.simulation import Simulation
 from distfsi.study.references import UNDEX_2D, RadialProfile
-from distfsi.study.tracks import Line, Measure, Tracks, crossing, follow, write_tracks
+from distfsi.study.tracks import Line, Measure, Tracks, crossing, record_tracks, write_tracks
 
-INPUT = Path(__file__).parents[2] / "inputs" / "undex_2d.toml"
+INPUT = shipped_inputs() / "undex_2d.toml"
 DIRECTORY = Path("out/study_undex_2d")
 RADII = (0.5, 0.4)  # the paper does not tell which [m]
 DIRECTIONS = {"axis": (1.0, 0.0), "diagonal": (sqrt(0.5), sqrt(0.5))}
@@ -44,7 +46,7 @@ class Explosion:
     @property
     def references(self) -> list[RadialProfile]:
         """What the radial computation tells of this charge."""
-        charge = self.scene.fluid.regions[1].shape.radius
+        charge = of_kind(Ball, present(self.scene.fluid).regions[1].shape).radius
         return [reference for reference in UNDEX_2D if reference.charge == charge]
 
     def at(self, direction: str, quantity: str, radius: float) -> float:
@@ -67,7 +69,7 @@ def explode(communicator: Communicator, charge: float, overrides: Sequence[str])
     def measure_of(simulation: Simulation) -> Measure:
         return _measure(simulation, profiles)
 
-    return Explosion(scene, follow(scene, communicator, measure_of, 1, PICTURE_TIMES), profiles)
+    return Explosion(scene, record_tracks(scene, communicator, measure_of, 1, PICTURE_TIMES), profiles)
 
 
 def _measure(simulation: Simulation, profiles: dict[str, dict[str, np.ndarray]]) -> Measure:
@@ -143,7 +145,7 @@ def maps(explosion: Explosion) -> list[Picture]:
     """Pressure at the times of the paper's Fig. 10."""
     scene = explosion.scene
     (left, right), (bottom, top) = zip(scene.domain.lower, scene.domain.upper, strict=True)
-    extent, limits = (left, right, bottom, top), (0.0, 1e-9 * scene.fluid.regions[1].state.pressure)
+    extent, limits = (left, right, bottom, top), (0.0, 1e-9 * present(scene.fluid).regions[1].state.pressure)
     pictures = []
     for time, path in series(Path(scene.output.directory), "cells"):
         pressure = 1e-9 * read_cells(path)[1]["pressure"][0]

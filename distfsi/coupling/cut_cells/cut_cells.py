@@ -1,4 +1,4 @@
-"""Fluid and solid together: cells that the wall cuts, with the volume that their fluid has swept (docs/theory.md)."""
+"""Fluid and solid together: cells that the wall cuts, each with a fluid volume fraction (docs/theory.md)."""
 
 from __future__ import annotations
 
@@ -6,30 +6,33 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.coupling.cut_cells import dust, sides, wall_particles
-from distfsi.coupling.cut_cells import forces as wall_forces
-from distfsi.coupling.cut_cells.dust import Dust
+from distfsi.coupling.cut_cells import fluxes, forces, lone, redistribution, sides, wall_particles
+from distfsi.coupling.cut_cells.fluxes import BandFluxes
 from distfsi.coupling.cut_cells.forces import WallForces
 from distfsi.coupling.cut_cells.geometry import WallGeometry
-from distfsi.coupling.cut_cells.kernels import fluxes as cut_fluxes
-from distfsi.coupling.cut_cells.kernels import redistribution as kernels
-from distfsi.coupling.cut_cells.kernels.band import FAR
+from distfsi.coupling.cut_cells.kernels.fluxes import StageTimes
+from distfsi.coupling.cut_cells.kernels.records import Walls
+from distfsi.coupling.cut_cells.lone import LoneParticles
+from distfsi.coupling.cut_cells.merging import CellMerging
+from distfsi.coupling.cut_cells.redistribution import Redistribution
 from distfsi.coupling.cut_cells.sides import Sides
+from distfsi.coupling.cut_cells.values import CellLists, CutGeometry, StageCells, Transfer
 from distfsi.coupling.cut_cells.wall_particles import WallParticles
 from distfsi.coupling.kernels.cells import COVERED, FLUID
+from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.fluid import Fluid, Stage
 from distfsi.fluid.initial import InitialState
+from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks, Snapshot
-from distfsi.mesh.chosen import ChosenGhosts
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.kernels.particles import EXCHANGE
 from distfsi.mesh.kernels.regions import copy_cells, copy_regions, pack_cells, unpack_cells
 from distfsi.mesh.particles import ParticleExchange
-from distfsi.mesh.rows import Groups
+from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid.solid import Solid
+from distfsi.solid.protocol import Structure
 
 LARGEST_MOVE = 0.3  # of a cell in a step, so that thin bodies stay closed, before forces between particles change it
 FARTHEST_MOVE = 0.35  # of a cell, whatever they do: then the solid makes no other sub-step
@@ -40,28 +43,15 @@ PARTICLE_DRIVERS = (
     unpack_cells,
     *row_kernels.REDUCTIONS,
     *wall_particles.DRIVERS,
-    *wall_forces.PARTICLE_DRIVERS,
-    *dust.PARTICLE_DRIVERS,
+    *forces.PARTICLE_DRIVERS,
+    *lone.PARTICLE_DRIVERS,
 )
 FLUID_DRIVERS = (
-    kernels.take_contents,
-    kernels.mark_leaving,
-    kernels.absorb,
-    kernels.find_trapped,
-    kernels.put_moved,
-    kernels.look_around,
-    kernels.mix,
-    kernels.put_mixed,
-    kernels.put_rest,
-    cut_fluxes.find_walls,
-    cut_fluxes.find_faces,
-    cut_fluxes.find_fluxes,
-    cut_fluxes.advance_band,
-    kernels.exchange_volumes,
+    *redistribution.DRIVERS,
+    *fluxes.DRIVERS,
     *sides.DRIVERS,
-    kernels.keep_volumes,
-    *wall_forces.FLUID_DRIVERS,
-    *dust.FLUID_DRIVERS,
+    *forces.FLUID_DRIVERS,
+    *lone.FLUID_DRIVERS,
 )
 
 
@@ -70,358 +60,285 @@ class CutCells:
 
     reach   [m]: how far the solid's ghosts must go for its own sake: not at all
     sub_steps, stray  the most sub-steps of the solid in a step, and how far its particles may go in them [m]
-    kind    field (local blocks, 1, Z, Y, X) on host and device: COVERED where a cell holds no fluid
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
             an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
             them, and has not)
+    geometry  of the last step; None before the first
     """
 
     causes = ("wall", "sides")
     reach = 0.0
 
-    def __init__(self, scene: Scene, model, fluid: Fluid, solid: Solid, blocks: Blocks, team: Device):
+    def __init__(
+        self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Structure, blocks: Blocks, device: Device
+    ) -> None:
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
-        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, team
+        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
-        real = np.dtype(scene.fluid.precision).type
-        self._stairs = scene.coupling.scheme == "stairs"
-        coarsest = max(body.spacing for body in scene.solid.bodies)
-        self.wall = WallGeometry(blocks, team, coarsest, real, scene.time.cfl, self._stairs)
-        constants = {"DIMENSIONS": grid.dimensions, "LANES": self.wall.lanes, "KICKS": 1 + grid.dimensions}
-        self.kernels = team.build(PARTICLE_DRIVERS, constants)
-        self.fluid_kernels = team.build(
-            FLUID_DRIVERS, model.constants | {"LANES": team.lanes}, model.bindings, scene.fluid.precision
-        )
-        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
-        self._near_ghosts = ChosenGhosts(self.exchange, team, self.kernels)
-        particles = ParticleExchange(blocks, team, self.kernels)
-        self._rows, built = particles.rows, (self.kernels, self.fluid_kernels)
-        self._particles = WallParticles(solid, particles, self.kernels, self.wall)
-        self._forces = WallForces(self.wall, self._particles, self._rows, built, self._near_ghosts)
-        self._spacing = np.array(grid.spacing)
-        self.sub_steps = scene.coupling.sub_steps
-        self.stray = FARTHEST_MOVE * float(self._spacing[: self._dimensions].min())
-        homes = (blocks.block_cells, blocks.curve_index)
-        lower, *homes = (team.array(np.array(values)) for values in (grid.lower, *homes))
-        place = (self.wall.shape, lower, self.wall.spacing, self.wall.origin, self.wall.cells, *homes, blocks.first)
-        self.dust = Dust(solid.columns, self._rows, built, self.wall, *place)
-        self._cell_volume = float(self._spacing.prod())
-        self._initial = InitialState(scene.fluid, model)
+        self._staircase = scene.coupling.scheme == "stairs"
+        self._particles = SolidParticles(solid)
+        self._cell_volume = float(np.prod(grid.spacing))
+        self._initial = InitialState(present(scene.fluid), model)
         self._rest = self._state_at_rest(scene)
-        self._rest_there = team.array(self._rest)
-
-        self.kind = DualArray(team, blocks.allocate(1, np.uint8))
-        self._fields = 3 if model.phases == 2 else 1
-        self.swept = DualArray(team, np.ones((blocks.local_count, self._fields, *blocks.shape), real))
-        fluid.volumes = self.swept
-        self._state_parity, self._swept_parity = (
-            team.array(np.where(axes < 0, 0, 1 << np.maximum(axes, 0)))
-            for axes in (model.mirror, np.full(self._fields, -1))
-        )
-        self._master = team.array(blocks.allocate(grid.dimensions, np.int8))
+        self.geometry: CutGeometry | None = None
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
-        self._sides = Sides(fluid, model.conserved, self.wall, self.fluid_kernels)
-        self._keep_lists([team.empty(0, np.int64)] * 3, np.zeros((blocks.local_count, 3), dtype=np.int64))
-        (position,) = solid.columns.read("position")
-        self._particles.look(position)
-        self.dust.find(solid.columns, self._particles.middle, self._particles.bins)
-        for _ in range(2):
-            self._particles.cut(position, team.zeros(position.shape))
+        self._build(scene)
+        self.sub_steps = scene.coupling.sub_steps
+        self._narrowest = float(min(grid.spacing[: grid.dimensions]))
+        self.stray = FARTHEST_MOVE * self._narrowest
+        fluid.set_volumes(self.fluid_volume)
+        # a wall that rests: the fractions before and after a step are the same
+        position = self._particles.position
+        passage = self._wall_particles.find(position)
+        self._lone.find(passage.middle, passage.bins)
+        for _ in ("before", "after"):
+            self._wall_particles.cut(passage, position, device.zeros(position.shape))
         self._fill_at_start()
+
+    def _build(self, scene: Scene) -> None:
+        """The kernels, and who uses them."""
+        blocks, device, model, grid = self.blocks, self.team, self.model, self.blocks.grid
+        coarsest = max(body.spacing for body in present(scene.solid).bodies)
+        self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
+        constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
+        constants |= {"LANES": self.wall.lanes, "TRANSFERRED": 1 + grid.dimensions}
+        of_particles = device.build(PARTICLE_DRIVERS, constants)
+        of_fluid = device.build(
+            FLUID_DRIVERS, model.constants | {"LANES": device.lanes}, model.bindings, present(scene.fluid).precision
+        )
+        ghosts = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
+        exchange = ParticleExchange(blocks, device, of_particles)
+        self._rows = exchange.rows
+        self._merging = CellMerging(self.wall, ghosts, of_particles, scene.time.cfl)
+        self._redistribution = Redistribution(model, self.wall, self._merging, self._rows, of_fluid, self._rest)
+        self._wall_particles = WallParticles(self._particles, exchange, of_particles, self.wall)
+        self._lone = LoneParticles(self._particles, self._rows, self.wall, of_particles, of_fluid)
+        self._fluxes = BandFluxes(model, self.wall.grid, device, self._rows, of_fluid)
+        self._forces = WallForces(self._particles, self.wall, self._merging, self._rows, of_particles, of_fluid)
+        self._sides = Sides(self.fluid, model.conserved, self.wall.grid, device, of_fluid)
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Conserved state (variables,) of the first region without its velocity."""
-        state = self._initial.of(scene.fluid.regions[0].state)
+        state = self._initial.of(present(scene.fluid).regions[0].state)
         rest = np.array(self.model.formula("primitives")(state))
         rest[self.model.phases : self.model.phases + self._dimensions] = 0.0
-        return np.array(self.model.formula("conserved")(tuple(rest)), dtype=scene.fluid.precision)
+        return np.array(self.model.formula("conserved")(tuple(rest)), dtype=present(scene.fluid).precision)
 
     def _fill_at_start(self) -> None:
-        """Cut cells hold the state at the middle of their open corners; fluid fills what is open."""
-        swept, kind, state = self.swept.host(), self.kind.host(), self.fluid.state
-        swept[:, 0] = self.wall.fractions[1].host()[:, 0]
+        """Cut cells hold the state at the middle of their open nodes; fluid fills what is open."""
+        volume, kind, state = self.fluid_volume.host(), self.kind.host(), self.fluid.state
+        volume[:, 0] = self.wall.fractions[1].host()[:, 0]
         for block in range(self.blocks.local_count):
             (x, y, z), middles = (a.T for a in self.wall.cut_cells(block))
             state[block][:, z, y, x] = self._initial.at(middles.T)
         self._classify()
-        swept[:, 1:] = 0.0
+        volume[:, 1:] = 0.0
         np.moveaxis(state, 1, -1)[kind[:, 0] == COVERED] = self._rest
-        for changed in (self.swept, self.fluid):
+        for changed in (self.fluid_volume, self.fluid):
             changed.changed()
-        self._exchange_swept()
+        self._fill_volume_ghosts()
 
     # ---- one step ---------------------------------------------------------------------------------------------------
 
     def time_step(self) -> float:
         """Longest step [s] in which no particle of this rank goes farther than LARGEST_MOVE."""
-        lowest, highest = self._rows.bounds(*self.solid.columns.read("velocity"))
+        lowest, highest = self._rows.bounds(self._particles.velocity)
         speed = max(-lowest.min(), highest.max())
-        return LARGEST_MOVE * float(self._spacing[: self._dimensions].min()) / max(speed, 1e-300)
+        return LARGEST_MOVE * self._narrowest / max(speed, 1e-300)
 
-    def update_geometry(self) -> None:
-        """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall."""
-        team, D = self.team, self._dimensions
-        particles = self._particles
-        particles.thickness.way += particles.look(self.solid.start)
-        self.dust.find(self.solid.columns, particles.middle, particles.bins)
-        self._lone = self.dust.rows(self.solid.columns)
-        particles.cut(self.solid.start, self.solid.carried)
-        self._find_company()
-        n = self._band.shape[0]
-        self._area, self._start_volume = team.empty((n, D)), team.empty(n)
-        self._opened, self._seen = team.empty((n, 2 * D)), team.empty(2 * D * n, np.int8)
-        self._run(self.fluid_kernels.find_walls, self._area, self._opened, *self._walls, self.wall.spacing)
-        self._run(self.fluid_kernels.find_faces, self._above, self._opened, self._seen, *self._walls)
-        self._faces = self._rows.marked(self._seen)[1]
-        self._flux = team.empty((n, 2 * D * self.model.constants["FLUXES"]))
-        self._forces.begin(self._band, self._groups, self._area)
-        self._sides.choose()
+    def update_geometry(self) -> CutGeometry:
+        """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall. From
+        then on the fluid's band holds contents, until merge()."""
+        start = self._particles.start
+        # particles
+        passage = self._wall_particles.find(start)
+        self._wall_particles.thin.drift += passage.farthest
+        self._lone.find(passage.middle, passage.bins)
+        rows = self._lone.rows()
+        # cells
+        motion = self._wall_particles.cut(passage, start, self._particles.carried)
+        lists, walls, expands = self._merge_cells(rows.shape[0] > 0)
+        merging, above = self._merging.merging_of(lists.band)
+        # faces
+        band, faces = self._fluxes.find_faces(lists.band, above, walls)
+        loads, walled = self._forces.begin(band, motion)
+        ends = self._merging.rows_in_band(self._sides.cells)
+        start_volume = self.team.empty(lists.band.shape[0])
+        self.geometry = CutGeometry(
+            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
+        )
+        return self.geometry
 
-    def before_stage(self, stage: Stage) -> None:
-        """Collective. Mix what belongs together in the stage's input, and leave it as states."""
-        U, first = self.fluid.input_of(stage), stage.number == 0
-        self._mix(U, self.wall.parts[0 if first else 1])
+    def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
+        """Collective. Find merge targets, and let isolated cells hand their fluid to receivers; the lists of cells, and
+        whether any rank has `lone` particles whose cells expand."""
+        walls = self._walls
+        self._merging.find_targets(walls, self.fluid_volume.device)
+        lists = self._merging.list_cells(walls, self.fluid_volume.device)
+        states = self._redistribution.states(self.fluid.device_state)
+        self._redistribution.take_contents(lists.band, states)
+        found = np.array([float(self._redistribution.any_absorbed(lists.band, walls.kind)), float(lone)])
+        absorbed, alone = self.blocks.communicator.maximum(found)
+        if absorbed > 0.0:
+            lists = self.absorb(lists, walls)
+        return lists, walls, bool(alone > 0.0) and not self._staircase
+
+    def absorb(self, lists: CellLists, walls: Walls) -> CellLists:
+        """Collective. Contents of isolated cells move to their receivers, and these cells are covered: the new
+        lists."""
+        contents = self._redistribution.contents(self.fluid.device_state)
+        self._redistribution.absorb(lists.band, contents, walls)
+        self._merging.cover_absorbed()
+        return self._merging.list_cells(walls, self.fluid_volume.device)
+
+    def merge(self, geometry: CutGeometry, stage: Stage) -> StageCells:
+        """Collective. Contents in the stage's input become states, those of merged cells one state."""
+        fluid, first = self.fluid, stage.number == 0
+        walls, contents = geometry.walls, self._redistribution.contents(fluid.input_of(stage))
+        fraction = walls.old_fraction if first else walls.new_fraction
+        states = self._redistribution.redistribute(geometry.lists, contents, fraction, geometry.merging)
         if first:
-            self._run(self.fluid_kernels.keep_volumes, self._swept, self.wall.shape, self._start_volume)
-        self.fluid.wake(self.wall.near.host() > 0)
-        self._start, self._input, self._output = self.fluid.device_state, U, self.fluid.output_of(stage)
+            self._redistribution.keep_volumes(geometry.band.cells, states, geometry.start_volume)
+        fluid.wake(self.wall.near.host() > 0)
+        output = self._redistribution.contents(fluid.output_of(stage))
+        return StageCells(fluid.device_state, states, output)
 
-    def after_stage(self, stage: Stage, dt: float) -> None:
-        """Advance the cells of the band in the place of the fluid's stage, of a step of `dt` [s]."""
-        rates, weight = np.array(self.fluid.rates(dt)[: len(self._spacing)]), stage.weight * dt
-        self._dt = dt
-        rates, weights = (self.team.array(a) for a in (rates, weight * self._cell_volume / self._spacing))
-        boxes, forces = -(-self._faces.shape[0] // self.team.lanes), self._forces
-        given = (self._band, self._faces, self._seen, self._flux, self._input, self.wall.shape, self.wall.steps, rates)
-        self.team.run(self.fluid_kernels.find_fluxes, boxes, *given)
-        self._run_boxes(
-            self.fluid_kernels.advance_band, self._above, self._opened, self._flux, self._start, self._input,
-            self._output, self._swept, self._start_volume, self._area, forces.velocity, forces.impulse, forces.work,
-            forces.added, self.wall.shape, rates, stage.b, dt, weight,
-        )  # fmt: skip
-        self._sides.book(self._input, self._walls, rates, weights)
-        if stage is self.fluid.stages[-1]:
-            self._settle()
+    def apply_wall_fluxes(self, geometry: CutGeometry, cells: StageCells, stage: Stage, dt: float) -> None:
+        """Advance the cells of the band in the place of the fluid's stage, in a step of `dt` [s], to contents."""
+        times = StageTimes(stage.b, dt, stage.weight * dt)
+        self._fluxes.advance(geometry, cells, times)
+        self._sides.account(geometry.sides, cells.input.U, geometry.walls, dt, times.weight)
 
-    def _settle(self) -> None:
-        """Mix what the last stage left, and exchange volumes so that they stay near the geometric ones."""
-        U, after, wall, k = self.fluid.device_state, self.wall.parts[1], self.wall, self.fluid_kernels
-        self._mix(U, after)
-        lists = [(cells, self._mixed(cells)) for cells in (self._band, self._loose)]
-        for _ in range(2):
-            self._exchange_contents(U)
-            for cells, mixed in lists:
-                self.team.run(
-                    k.exchange_volumes, cells.shape[0], cells, mixed, U, self._swept, self._kinds, after, *wall.faces,
-                    self._expands, wall.steps, wall.shape, wall.origin, wall.cells,
-                )  # fmt: skip
-            for cells, mixed in lists:
-                self.team.run(k.put_mixed, cells.shape[0], cells, mixed, U, self._swept, wall.shape)
-        self._near_ghosts.exchange((self.swept.device, self._swept_parity))
+    def redistribute(self, geometry: CutGeometry) -> None:
+        """Collective. Contents that the last stage left become states; volumes come nearer to the geometric ones."""
+        contents = self._redistribution.contents(self.fluid.device_state)
+        fraction = geometry.walls.new_fraction
+        states = self._redistribution.redistribute(geometry.lists, contents, fraction, geometry.merging)
+        self._redistribution.exchange_volumes(geometry.lists, states, geometry.walls, geometry.expands)
 
-    def transfer_impulse(self) -> Any:
-        """Collective. Impulse (own, D) [N s] of the fluid on this rank's particles in the step, on the device."""
-        given = self._forces.impulse_on(self.solid)
+    def transfer_impulse(self, geometry: CutGeometry, cells: StageCells, dt: float) -> Transfer:
+        """Collective. What the fluid gives to this rank's particles in a step of `dt` [s] whose last stage had the
+        `cells`."""
+        impulse, shared = self._forces.impulse_on(geometry)
         paid = np.zeros((self.blocks.local_count, self._dimensions + 1))
-        self._dragged = self.drag(self._lone, given) if self._lone.shape[0] else paid
-        return given
+        if geometry.lone.shape[0]:
+            paid = self.drag(geometry, geometry.lone, cells.input.U, impulse, dt)
+        return Transfer(impulse, shared, paid)
 
-    def drag(self, rows: Any, impulse: Any) -> np.ndarray:
-        """The fluid moves the lone particles `rows` (n,) in the last step: their rows of `impulse` (own, D) [N s] are
-        found, and what the fluid of each block pays for it (local blocks, D + 1) [N s, J]."""
-        block, paid = self.dust.drag(
-            self.solid.columns, rows, self.solid.start, self._dt, impulse, (self.fluid.device_state, self._swept),
-            self._input, self._kinds,
-        )  # fmt: skip
+    def drag(self, geometry: CutGeometry, rows: Any, pressing: Any, impulse: Any, dt: float) -> np.ndarray:
+        """The fluid moves the lone particles `rows` (n,) in a step of `dt` [s], whose last stage had the input
+        `pressing`: their rows of `impulse` (own, D) [N s] are found, and what the fluid of each block pays for it
+        (local blocks, D + 1) [N s, J]."""
+        states = self._redistribution.states(self.fluid.device_state)
+        block, paid = self._lone.drag(rows, impulse, states, pressing, geometry.walls, dt)
         sums = np.zeros((self.blocks.local_count, self._dimensions + 1))
         np.add.at(sums, block, paid)
         self.fluid.wake(np.bincount(block, minlength=len(sums)) > 0)
         return sums
 
-    def account_work(self, excess: Any) -> None:
+    def account_work(self, geometry: CutGeometry, transfer: Transfer, excess: Any) -> None:
         """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
         velocity of the wall: the fluid pays for it."""
-        D, P = self._dimensions, self.model.phases
-        fluid = (self._joined, self.fluid.device_state, self._swept, *self._company)
-        impulse, work = self._forces.pay(self.solid, excess, *fluid)
-        self._wall_sums[:, P : P + D] += self.solid.given.sum(axis=1) - impulse - self._dragged[:, :-1]
-        self._wall_sums[:, -1] += self.solid.work - work - self._dragged[:, -1]
+        D, P, p = self._dimensions, self.model.phases, self._particles
+        states = self._redistribution.states(self.fluid.device_state)
+        impulse, work = self._forces.correct(geometry, excess, transfer.shared, states)
+        self._wall_sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
+        self._wall_sums[:, -1] += p.work - work - transfer.dragged[:, -1]
+
+    # ---- between steps ----------------------------------------------------------------------------------------------
 
     def pressure(self, dt: float) -> float:
         """Collective. The highest mean pressure [Pa] on a cell's wall in the last step, of `dt` [s]."""
-        highest = self._rows.largest(self._forces.pressures(), 0.0) / dt
+        pressures = self._forces.pressures(present(self.geometry))
+        highest = self._rows.largest(pressures, 0.0) / dt
         return float(self.blocks.communicator.maximum(np.array([highest]))[0])
 
     def trapped(self) -> np.ndarray:
-        """Collective. Mass [kg] of each phase in cells that are shut: it neither flows nor pushes."""
-        held = self.team.empty((self._band.shape[0], self.model.phases))
-        self._run(
-            self.fluid_kernels.find_trapped, held, self._kinds, self.fluid.device_state, self._swept, self.wall.shape
-        )
-        return self.blocks.sum(self._cell_volume * self._groups.sums(held))
+        """Collective. Mass [kg] of each phase in isolated cells: it neither flows nor pushes."""
+        held = np.zeros((self.blocks.local_count, self.model.phases))
+        if self.geometry is not None:
+            lists, states = self.geometry.lists, self._redistribution.states(self.fluid.device_state)
+            kind = self.kind.device.reshape(-1)
+            held = self._cell_volume * lists.blocks.sums(self._redistribution.trapped(lists.band, states, kind))
+        return self.blocks.sum(held)
 
     def let_fluid_leave(self) -> None:
         """All that the fluid holds leaves the domain; from now on no cell has any."""
         self.fluid.leave(self.volume)
-        self.swept.host()[:] = 0.0
-        self.swept.changed()
+        self.fluid_volume.host()[:] = 0.0
+        self.fluid_volume.changed()
         self._classify()
 
     def _classify(self) -> None:
         """Which cells are covered, by what they hold."""
-        holds = self.swept.host()[:, :1] > 0.0
+        holds = self.fluid_volume.host()[:, :1] > 0.0
         self.kind.host()[:] = np.where(holds, FLUID, COVERED)
         self.kind.changed()
 
-    # ---- parts of it ------------------------------------------------------------------------------------------------
-
-    def _find_company(self) -> None:
-        """Which cells join which, and the lists of the band's, the covered and the loose cells."""
-        self.wall.find_masters(self._kinds, self._masters, self._swept, self._fields)
-        self._exchange(self.kind.device, np.array([-1]), FLUID)
-        self.wall.find_refuges(self._kinds, self._masters)
-        self._exchange(self._master, np.arange(self._dimensions), 0)
-        self._list_cells()
-        self._run(self.fluid_kernels.take_contents, self.fluid.device_state, self._swept, self.wall.shape)
-        mark = self.team.empty(self._band.shape[0], np.int8)
-        self._run(self.fluid_kernels.mark_leaving, mark, self._kinds, self._masters, self.wall.shape, self.wall.steps)
-        found = np.array([float(self._rows.any(mark)), float(self._lone.shape[0])])
-        leaving, lone = self.blocks.communicator.maximum(found)
-        if leaving > 0.0:
-            self.absorb()
-        self._expands = int(lone > 0.0 and not self._stairs)
-        self._look_around()
-
-    def absorb(self) -> None:
-        """Collective. Contents of cells that are shut move, and these are covered."""
-        U, wall, k = self.fluid.device_state, self.wall, self.fluid_kernels
-        self._exchange_contents(U)
-        moved = self.team.empty((self._band.shape[0], self.model.variables + 3), U.dtype)
-        self._run(
-            k.absorb, moved, U, self._swept, self._kinds, wall.parts[0], self._masters, wall.steps, wall.shape
-        )  # fmt: skip
-        self._run(k.put_moved, moved, U, self._swept, wall.shape)
-        wall.cover_evicted(self._kinds, self._masters)
-        self._list_cells()
-
-    def _look_around(self) -> None:
-        """Which cells around the band's belong together, and which of the band are next to each other."""
-        wall, count, D = self.wall, self._band.shape[0], self._dimensions
-        self._joined = self.team.empty((count, wall.offsets.shape[0]), np.int8)
-        self._above = self.team.empty((count, D), np.int64)
-        given = (self._masters, wall.offsets, wall.steps, wall.shape, wall.origin, wall.cells)
-        self._run(self.fluid_kernels.look_around, self._joined, self._above, *given)
-
-    def _list_cells(self) -> None:
-        """Find the lists, and which ghosts are around the wall."""
-        self._keep_lists(*self.wall.lists(self._kinds, self._swept, self._fields))
-        self._exchange(self.wall.mark, np.array([-1]), FAR)
-        self._near_ghosts.choose(self.wall.mark.reshape(-1))
-
-    def _keep_lists(self, lists: list[Any], counts: np.ndarray) -> None:
-        self._band, self._covered, self._loose = lists
-        self._band_cells = counts[:, 0]
-        self._groups = Groups(self.team, self.kernels, self._band_cells)
-
-    def _mix(self, U: Any, fraction: Any) -> None:
-        """Contents of the band become states of what belongs together; covered cells rest."""
-        self._exchange_contents(U)
-        wall, k, mixed = self.wall, self.fluid_kernels, self._mixed(self._band)
-        self._run_boxes(k.mix, self._joined, mixed, U, self._swept, fraction, *self._company)
-        self._run(k.put_mixed, mixed, U, self._swept, wall.shape)
-        rest = (self._covered, U, self._swept, self._rest_there, wall.shape)
-        self.team.run(k.put_rest, self._covered.shape[0], *rest)
-
-    def _mixed(self, cells: Any) -> Any:
-        """Room for states and volumes of a list of cells."""
-        return self.team.empty((cells.shape[0], self.model.variables + 1), self.swept.dtype)
-
-    def _run(self, kernel: Any, *arguments: Any) -> None:
-        self.team.run(kernel, self._band.shape[0], self._band, *arguments)
-
-    def _run_boxes(self, kernel: Any, *arguments: Any) -> None:
-        """`_run`, of a kernel whose items are boxes of the device's lanes."""
-        self.team.run(kernel, -(-self._band.shape[0] // self.team.lanes), self._band, *arguments)
-
-    @property
-    def _swept(self) -> Any:
-        return self.swept.device.reshape(-1)
-
-    @property
-    def _kinds(self) -> Any:
-        return self.kind.device.reshape(-1)
-
-    @property
-    def _masters(self) -> Any:
-        return self._master.reshape(-1)
-
-    @property
-    def _walls(self) -> tuple[Any, ...]:
-        """What decides how open a face is."""
-        return self._kinds, *self.wall.faces, self.wall.shape, self.wall.steps
-
-    @property
-    def _company(self) -> tuple[Any, ...]:
-        """What tells where masters and other neighbours are."""
-        return self._masters, self.wall.offsets, self.wall.steps, self.wall.shape
-
-    def _exchange(self, field: Any, mirror: np.ndarray, inflow: float) -> None:
-        self.exchange.start(field, mirror, np.full((3, 2, field.shape[1]), inflow))
-        self.exchange.finish()
-
-    def _exchange_contents(self, U: Any) -> None:
-        """Of the cells around the wall."""
-        self._near_ghosts.exchange((U, self._state_parity), (self.swept.device, self._swept_parity))
-
-    def _exchange_swept(self) -> None:
-        self._exchange(self.swept.device, np.full(self._fields, -1), 1.0)
+    def _fill_volume_ghosts(self) -> None:
+        self._merging.fill_ghosts(self.fluid_volume.device, np.full(self._redistribution.fields, -1), 1.0)
 
     # ---- looking at it ----------------------------------------------------------------------------------------------
 
     @property
+    def kind(self) -> DualArray:
+        """Field (local blocks, 1, Z, Y, X) on host and device: COVERED where a cell holds no fluid."""
+        return self._merging.kind
+
+    @property
+    def fluid_volume(self) -> DualArray:
+        """Field (local blocks, …, Z, Y, X) on host and device: fluid volume fraction of each cell, first."""
+        return self._redistribution.volume
+
+    @property
+    def _walls(self) -> Walls:
+        kind = self.kind.device.reshape(-1)
+        return Walls(kind, *self.wall.flat_fractions, *self.wall.flat_apertures)
+
+    @property
     def covered(self) -> np.ndarray:
         """(local blocks, Z, Y, X) whether a cell holds no fluid, ghosts included."""
-        return self.swept.host()[:, 0] <= 0.0
+        return self.fluid_volume.host()[:, 0] <= 0.0
 
     @property
     def volume(self) -> np.ndarray:
         """(local blocks, Z, Y, X) the part of each cell that its fluid fills."""
-        return self.swept.host()[:, 0]
+        return self.fluid_volume.host()[:, 0]
 
     def memory(self) -> int:
-        """Bytes of this rank's fields, the corners' as if they were as many as cells."""
-        fields = (self.kind, self.swept, *self.wall.fractions, *self.wall.apertures)
+        """Bytes of this rank's fields, those of nodes as if they were as many as cells."""
+        fields = (self.kind, self.fluid_volume, *self.wall.fractions, *self.wall.apertures)
         cells, D = self.kind.nbytes, self._dimensions
         return sum(field.nbytes for field in fields) + cells * (2 + D + 8 * (1 + D) + 8)
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells in the band around the wall."""
-        return self._band_cells.astype(float)
+        counts = self.geometry.lists.counts if self.geometry else np.zeros(self.blocks.local_count)
+        return counts.astype(float)
 
     def snapshot(self) -> Snapshot:
-        """What a restart needs: the volumes, and the books."""
+        """What a restart needs: the volumes, and the budget."""
         return {
-            "cells": {"swept": self.blocks.without_ghosts(self.swept.host()[:, :1])},
+            "cells": {"fluid_volume": self.blocks.without_ghosts(self.fluid_volume.host()[:, :1])},
             "sums": {"wall": self._wall_sums, "sides": self._sides.passed.host()},
-            "values": {"way": np.array(self._particles.thickness.way)},
+            "values": {"drift": np.array(self._wall_particles.thin.drift)},
         }
 
     def restore(self, snapshot: Snapshot) -> None:
         """Collective. Go on from a snapshot, after the solid has."""
-        self.blocks.without_ghosts(self.swept.host()[:, :1])[:] = snapshot["cells"]["swept"]
-        self.swept.changed()
+        self.blocks.without_ghosts(self.fluid_volume.host()[:, :1])[:] = snapshot["cells"]["fluid_volume"]
+        self.fluid_volume.changed()
         self._classify()
-        self._exchange_swept()
-        self._particles.thickness.way = float(snapshot["values"]["way"])
+        self._fill_volume_ghosts()
+        self._wall_particles.thin.drift = float(snapshot["values"]["drift"])
         self._wall_sums[:] = snapshot["sums"]["wall"]
         self._sides.restore(snapshot["sums"]["sides"])
         self.wall.near.host()[:] = 1
         self.wall.near.changed()
-        position, velocity = self.solid.columns.read("position", "velocity")
-        self._particles.look(position)
-        self._particles.cut(position, velocity)
+        position = self._particles.position
+        self._wall_particles.cut(self._wall_particles.find(position), position, self._particles.velocity)
 
-    def ledger(self) -> dict[str, np.ndarray]:
+    def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
         totals = self.blocks.sum(np.hstack([self._wall_sums, self._sides.sums()]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

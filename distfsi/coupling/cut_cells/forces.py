@@ -1,4 +1,4 @@
-"""What fluid and solid give to each other at the wall: impulse, work, and the mass of fluid that goes along."""
+"""The loads of the fluid on the wall: impulse, work, and the mass of fluid that goes along."""
 
 from __future__ import annotations
 
@@ -8,133 +8,128 @@ from typing import Any
 import numpy as np
 
 from distfsi.coupling.cut_cells.geometry import WallGeometry
-from distfsi.coupling.cut_cells.kernels import forces as cut_forces
+from distfsi.coupling.cut_cells.kernels import forces as kernels
 from distfsi.coupling.cut_cells.kernels.band import BAND
-from distfsi.coupling.cut_cells.wall_particles import WallParticles
-from distfsi.coupling.kernels import spreading as push
-from distfsi.mesh.blocks import GHOSTS
-from distfsi.mesh.chosen import ChosenGhosts
-from distfsi.mesh.rows import Groups, Rows
-from distfsi.solid.solid import Solid
+from distfsi.coupling.cut_cells.kernels.records import Band, States, WallLoads
+from distfsi.coupling.cut_cells.merging import CellMerging
+from distfsi.coupling.cut_cells.values import CutGeometry, WallMotion
+from distfsi.coupling.kernels import spreading
+from distfsi.coupling.kernels.interpolation import Cloud
+from distfsi.coupling.kernels.spreading import Receivers
+from distfsi.coupling.particles import SolidParticles
+from distfsi.mesh.rows import Rows
 
 PARTICLE_DRIVERS = (
-    cut_forces.find_momentum,
-    cut_forces.find_gains,
-    cut_forces.mark_walled,
-    cut_forces.see_particles,
-    cut_forces.push_together,
-    cut_forces.find_pressures,
-    cut_forces.find_debts,
-    push.find_homes,
-    push.gather_kicks,
+    kernels.find_momentum,
+    kernels.find_gains,
+    kernels.mark_walled,
+    kernels.interpolate,
+    kernels.push_together,
+    kernels.find_pressures,
+    kernels.find_corrections,
+    spreading.find_homes,
+    spreading.spread,
 )
-FLUID_DRIVERS = (cut_forces.spread_impulse, cut_forces.pay_debts)
+FLUID_DRIVERS = (kernels.find_transfer, kernels.correct_energy)
 
 
 class WallForces:
-    """In a step: begin(), the stages add to what is below, impulse_on(), pay(). Cells give to particles with the
-    weights by which they see them, so that momentum and energy arrive as they leave.
-
-    velocity (n, D) [m/s] of the wall in the cells of the band
-    impulse  (n, D) [N s/m3], work (n,) [J/m3], added (n,) [kg/m3]: what the fluid gives per volume of a cell, and by
-             how much less impulse that were per velocity of the wall
-    """
+    """Cells see the particles, and give to them with the same weights, so that momentum and energy arrive as they
+    leave. In a step: begin(), the stages add to what it returns, impulse_on(), correct()."""
 
     def __init__(
         self,
+        particles: SolidParticles,
         wall: WallGeometry,
-        particles: WallParticles,
+        merging: CellMerging,
         rows: Rows,
-        kernels: tuple[SimpleNamespace, SimpleNamespace],
-        near_ghosts: ChosenGhosts,
+        particle_kernels: SimpleNamespace,
+        fluid_kernels: SimpleNamespace,
     ):
-        """`kernels`: PARTICLE_DRIVERS and FLUID_DRIVERS as built; `near_ghosts`: of the cells around the wall."""
-        blocks, self._team = wall.blocks, wall.team
-        grid, array = blocks.grid, wall.team.array
-        self._wall, self._particles, self._rows, self._ghosts = wall, particles, rows, near_ghosts
-        self._kernels, self._fluid_kernels = kernels
+        """`particle_kernels`, `fluid_kernels`: PARTICLE_DRIVERS and FLUID_DRIVERS as built."""
+        blocks, self._device, self._grid = wall.blocks, wall.device, wall.grid
+        self._particles, self._wall, self._merging, self._rows = particles, wall, merging, rows
+        self._kernels, self._fluid_kernels = particle_kernels, fluid_kernels
+        grid, array = blocks.grid, wall.device.array
         self._D, self._cell_volume = grid.dimensions, float(np.prod(grid.spacing))
-        self._given = array(blocks.allocate(1 + self._D))
+        self._table = blocks.table_on(wall.device)
+        self._transfer = array(blocks.allocate(1 + self._D))
         self._parity = array(np.append(1 << np.arange(self._D), 0))
-        self._grid = (array(np.array(grid.lower)), wall.spacing)
-        homes = [array(np.array(values)) for values in (blocks.block_cells, blocks.curve_index)]
-        self._homes = (wall.cells, *homes, blocks.first)
-        images = GHOSTS * (np.arange(3) < grid.dimensions)
+        images = np.array(grid.ghosts)
         self._seen_cells = array(np.column_stack([-images, grid.cells + images]))
 
-    def begin(self, band: Any, groups: Groups, area: Any) -> None:
-        """Find the wall's velocity in the cells of the band, which it passes with an `area` (n, D) [1/m]; `groups`: its
-        cells by blocks."""
-        team, n, D = self._team, band.shape[0], self._D
-        self._band, self._groups, self._area = band, groups, area
-        self.velocity, self._inertia = team.zeros((n, D)), team.zeros(n)
-        self.impulse, self.work, self.added = team.zeros((n, D)), team.zeros(n), team.zeros(n)
-        mark = team.empty(n, np.int8)
-        self._run(self._kernels.mark_walled, area, mark)
+    def begin(self, band: Band, motion: WallMotion) -> tuple[WallLoads, Any]:
+        """The loads on the wall in a step, none at first, and with which velocity the wall moves in the cells of the
+        band; which of these it passes through, as places in the band."""
+        device, n, D = self._device, band.cells.shape[0], self._D
+        sums = (device.zeros((n, D)), device.zeros(n), device.zeros((n, D)), device.zeros(n), device.zeros(n))
+        loads, mark = WallLoads(*sums), device.empty(n, np.int8)
+        device.run(self._kernels.mark_walled, n, band.area, mark)
         walled = self._rows.marked(mark)[1]
-        self._walled = self._wall.near_order(walled, self._rows.taken(band, walled), self._wall.blocks.shape)
-        self._see(self._particles.velocity, self.velocity)
+        walled = self._wall.near_order(walled, self._rows.taken(band.cells, walled), self._wall.blocks.shape)
+        self._interpolate(band.cells, walled, motion, motion.velocity, loads.velocity, loads.inertia)
+        return loads, walled
 
-    def impulse_on(self, solid: Solid) -> Any:
-        """Collective, after the stages. Impulse (own, D) [N s] on this rank's particles, on the device."""
-        team, own, wall = self._team, solid.count, self._wall
-        known = (self._cell_volume, self.impulse, self.added, self._inertia, self._given, wall.shape)
-        self._run(self._fluid_kernels.spread_impulse, *known)
-        self._ghosts.exchange((self._given, self._parity))
-        given, self._shared = (team.empty((own, self._D)) for _ in range(2))
-        fixed, velocity = solid.columns.read("fixed", "velocity")
-        known = (self._particles.own_mass, fixed, solid.before, velocity, self._gather(solid))
-        team.run(self._kernels.push_together, own, *known, given, self._shared)
-        return given
+    def impulse_on(self, geometry: CutGeometry) -> tuple[Any, Any]:
+        """Collective, after the stages. Impulse (own, D) [N s] on this rank's particles; and the velocity (own, D)
+        [m/s] per added mass of fluid that goes along with light ones."""
+        device, p, band, motion = self._device, self._particles, geometry.band, geometry.motion
+        known = (band.cells, geometry.loads, self._transfer, self._grid)
+        device.run(self._fluid_kernels.find_transfer, band.cells.shape[0], *known)
+        self._merging.ghosts.exchange((self._transfer, self._parity))
+        impulse, shared = (device.empty((p.count, self._D)) for _ in ("impulse", "shared"))
+        moving = (motion.own_mass, p.fixed, p.before, p.velocity, self._spread(motion))
+        device.run(self._kernels.push_together, p.count, *moving, impulse, shared)
+        return impulse, shared
 
-    def pay(self, solid: Solid, excess: Any, joined: Any, U: Any, swept: Any, *company: Any) -> tuple[Any, Any]:
-        """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
-        velocity of the wall: the fluid in U and `swept` pays for it, cells for those that `joined` them. Returns what
-        it has given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
-        team, own, D, kernels = self._team, solid.count, self._D, self._kernels
-        vector, gains = tuple((a,) for a in range(D)), team.empty((own, 2 * D + 1))
-        team.run(kernels.find_gains, own, solid.carried, excess, self._shared, gains)
-        (gains,) = self._particles.plan.exchange([(gains, (*vector, *vector, ()))])
-        seen, paid = team.zeros((self._band.shape[0], 2 * D + 1)), team.empty(self._band.shape)
-        self._see(gains, seen)
-        debt = self._given.reshape(-1)
-        self._run(kernels.find_debts, self.added, self.impulse, seen, debt, self._wall.shape)
-        self._ghosts.exchange((self._given, self._parity))
-        self._run(self._fluid_kernels.pay_debts, joined, paid, debt, U, swept, *company)
-        impulse, work, extra = (self._cell_volume * self._groups.sums(a) for a in (self.impulse, self.work, paid))
+    def correct(self, geometry: CutGeometry, excess: Any, shared: Any, states: States) -> tuple[np.ndarray, np.ndarray]:
+        """Collective, after solid.apply_impulse(): the energy correction. The fluid pays for the velocity at which
+        impulses worked over that of the wall, `excess` (own, D) [m/s]; `shared` as of impulse_on(). Returns what it has
+        given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
+        device, own, D, k = self._device, self._particles.count, self._D, self._kernels
+        band, loads, n = geometry.band, geometry.loads, geometry.band.cells.shape[0]
+        # what cells see of the gains
+        vector, gains = tuple((a,) for a in range(D)), device.empty((own, 2 * D + 1))
+        device.run(k.find_gains, own, self._particles.carried, excess, shared, gains)
+        (gains,) = geometry.motion.passage.plan.exchange([(gains, (*vector, *vector, ()))])
+        seen, paid = device.zeros((n, 2 * D + 1)), device.empty(n)
+        self._interpolate(band.cells, geometry.walled, geometry.motion, gains, seen, loads.inertia)
+        # merge targets pay
+        correction = self._transfer.reshape(-1)
+        device.run(k.find_corrections, n, band.cells, loads, seen, correction, self._grid)
+        self._merging.ghosts.exchange((self._transfer, self._parity))
+        known = (geometry.merging, correction, paid, states, self._grid)
+        device.run(self._fluid_kernels.correct_energy, n, band.cells, *known)
+        given = (loads.impulse, loads.work, paid)
+        impulse, work, extra = (self._cell_volume * geometry.lists.blocks.sums(amounts) for amounts in given)
         return impulse, work[:, 0] + extra[:, 0]
 
-    def pressures(self) -> Any:
+    def pressures(self, geometry: CutGeometry) -> Any:
         """Mean pressure times the time [Pa s] on the wall in each cell of the band, (n,) on the device."""
-        pressure = self._team.empty(self._band.shape[0])
-        self._run(self._kernels.find_pressures, self._area, self.impulse, pressure)
+        n = geometry.band.cells.shape[0]
+        pressure = self._device.empty(n)
+        self._device.run(self._kernels.find_pressures, n, geometry.band.area, geometry.loads.impulse, pressure)
         return pressure
 
-    def _see(self, values: Any, mean: Any) -> None:
+    def _interpolate(self, band: Any, walled: Any, motion: WallMotion, values: Any, mean: Any, inertia: Any) -> None:
         """mean (band, k) of what particles have (count, k) around the cells with a wall, where they were in the middle
         of the step: only there is the way that a turning wall went along itself."""
-        (count, width), wall, seen = values.shape, self._wall, self._particles
-        amounts = self._team.empty((count, 1 + width))
-        self._team.run(self._kernels.find_momentum, count, width, seen.mass, values, amounts)
-        boxes = -(-self._walled.shape[0] // wall.lanes)
-        self._team.run(
-            self._kernels.see_particles, boxes, self._band, self._walled, width, mean, self._inertia, wall.seen,
-            amounts.reshape(-1), seen.middle, *seen.bins, wall.shape, wall.spacing, wall.origin,
-        )  # fmt: skip
+        (count, width), wall = values.shape, self._wall
+        amounts = self._device.empty((count, 1 + width))
+        self._device.run(self._kernels.find_momentum, count, width, motion.mass, values, amounts)
+        particles = Cloud(motion.passage.middle, amounts, motion.passage.bins)
+        boxes, known = -(-walled.shape[0] // wall.lanes), (width, mean, inertia, wall.seen, particles, self._grid)
+        self._device.run(self._kernels.interpolate, boxes, band, walled, *known)
 
-    def _gather(self, solid: Solid) -> Any:
+    def _spread(self, motion: WallMotion) -> Any:
         """What the cells give to the mass of each of this rank's particles (own, 1 + D): velocity, and added mass over
         its own."""
-        own, wall, team, kernels = solid.count, self._wall, self._team, self._kernels
-        gained, home, middle = team.empty((own, 1 + self._D)), team.empty(own, np.int64), self._particles.own_middle
-        chosen = wall.coarse_order(middle, *solid.columns.read("id"))
-        team.run(kernels.find_homes, own, solid.start, home, *self._grid, *self._homes)
-        team.run(
-            kernels.gather_kicks, -(-own // wall.lanes), chosen, middle, home, self._particles.image, gained, wall.seen,
-            wall.mark.reshape(-1), BAND, self._given, wall.shape, *self._grid, wall.origin, wall.extent,
-            self._seen_cells, wall.cells,
-        )  # fmt: skip
+        own, wall, device, k = self._particles.count, self._wall, self._device, self._kernels
+        middle = motion.passage.own_middle
+        gained, home = device.empty((own, 1 + self._D)), device.empty(own, np.int64)
+        chosen = wall.coarse_order(middle, self._particles.id_on_device)
+        device.run(k.find_homes, own, self._particles.start, home, self._grid, self._table)
+        given = (wall.seen, self._merging.mark, BAND, self._transfer, self._seen_cells)
+        receivers = Receivers(middle, home, motion.image)
+        device.run(k.spread, -(-own // wall.lanes), chosen, receivers, *given, gained, self._grid)
         return gained
-
-    def _run(self, kernel: Any, *arguments: Any) -> None:
-        self._team.run(kernel, self._band.shape[0], self._band, *arguments)

@@ -8,96 +8,105 @@ from typing import Any
 import numpy as np
 
 from distfsi.coupling.cut_cells.geometry import WallGeometry
-from distfsi.coupling.cut_cells.kernels import forces as cut_forces
+from distfsi.coupling.cut_cells.inflation import ThinBodies
 from distfsi.coupling.cut_cells.kernels import images
-from distfsi.coupling.cut_cells.thickness import Thickness
+from distfsi.coupling.cut_cells.kernels import particles as kernels
+from distfsi.coupling.cut_cells.kernels.particles import Domain
+from distfsi.coupling.cut_cells.values import Passage, WallMotion
 from distfsi.coupling.cut_cells.wall_points import WallPoints
+from distfsi.coupling.kernels.interpolation import Cloud
+from distfsi.coupling.particles import SolidParticles
 from distfsi.mesh.particles import GhostPlan, ParticleExchange
-from distfsi.solid.solid import Solid
 
 MIRRORS = ("symmetry", "wall", "outflow", "inflow")
 DRIVERS = (
-    cut_forces.keep_mass,
-    cut_forces.keep_inside,
-    cut_forces.find_volumes,
-    cut_forces.mark_stretched,
-    cut_forces.find_middle,
+    kernels.keep_mass,
+    kernels.keep_inside,
+    kernels.find_volumes,
+    kernels.mark_stretched,
+    kernels.find_middle,
     images.weigh_images,
     images.fade_images,
 )
 
 
 class WallParticles:
-    """Own particles first, then ghosts and images, all that this rank's cells see.
+    """Finds the wall that the particles make, and cuts the cells with it.
 
-    plan        who needs copies of which particles
-    own_middle, middle  (own, D), (count, D) [m]: of their ways in the step; bins: the search cells of these
-    own_mass, mass      (own,), (count,) [kg], 0 of those that are no wall
-    velocity    (count, D) [m/s] with which they have moved
-    image       (own, D): how much the images of a particle along each axis count
-    thickness   of bodies (coupling/cut_cells/thickness.py)
+    thin  bodies (coupling/cut_cells/inflation.py)
     """
 
-    def __init__(self, solid: Solid, exchange: ParticleExchange, kernels: SimpleNamespace, wall: WallGeometry):
+    def __init__(
+        self, particles: SolidParticles, exchange: ParticleExchange, kernels: SimpleNamespace, wall: WallGeometry
+    ):
         """`kernels` holds DRIVERS."""
         grid = wall.blocks.grid
-        self._solid, self._exchange, self._kernels, self._wall = solid, exchange, kernels, wall
+        self._particles, self._exchange, self._kernels, self._wall = particles, exchange, kernels, wall
         self._D = grid.dimensions
-        self._team, self._communicator = wall.team, wall.blocks.communicator
+        self._device, self._communicator = wall.device, wall.blocks.communicator
         cell = max(grid.spacing[: grid.dimensions])
-        self._points = WallPoints(exchange.rows, kernels, cell)
-        self.thickness = Thickness(solid.columns, wall, cell)
-        self._corners = [self._team.array(np.array(corner)) for corner in (grid.lower, grid.upper)]
+        self._points = WallPoints(particles, exchange.rows, kernels, cell)
+        self.thin = ThinBodies(particles, wall, cell)
+        self._domain = Domain(*(self._device.array(np.array(corner)) for corner in (grid.lower, grid.upper)))
 
-    def look(self, start: Any) -> float:
-        """Collective. Find the particles, which have moved from `start`; how far one did at most along an axis [m]."""
-        c, team, own = self._solid.columns, self._team, self._solid.count
-        self.own_middle, way = team.empty(start.shape), team.empty(own)
-        team.run(self._kernels.find_middle, own, start, *c.read("position"), self.own_middle, way)
-        self._stretched = self._points.stretched(c)
-        most = np.array([self._exchange.rows.largest(way, 0.0), float(self._stretched.shape[0])])
-        farthest, split = self._communicator.maximum(most)
-        self._split = split > 0.0
-        self.plan = self._ghosts(start, c["id"])
-        (self.middle,) = self.plan.exchange([(self.own_middle, "position")])
-        self.bins = self._wall.sort(self.middle, self.plan.key.device)
-        return farthest
+    def find(self, start: Any) -> Passage:
+        """Collective. Find the particles, which have moved from `start` (own, D) [m]."""
+        device, own = self._device, self._particles.count
+        own_middle, way = device.empty(start.shape), device.empty(own)
+        device.run(self._kernels.find_middle, own, start, self._particles.position, own_middle, way)
+        stretched = self._points.stretched()
+        largest = np.array([self._exchange.rows.largest(way, 0.0), float(stretched.shape[0])])
+        farthest, split = self._communicator.maximum(largest)
+        plan = self._ghosts(start, self._particles.id)
+        (middle,) = plan.exchange([(own_middle, "position")])
+        bins = self._wall.sort(middle, plan.key.device)
+        return Passage(plan, own_middle, middle, bins, stretched, bool(split > 0.0), float(farthest))
 
-    def cut(self, start: Any, velocity: Any) -> None:
-        """Collective, after look(). Cut the cells where the particles are, which have moved from `start` with
-        `velocity`."""
-        c, team, wall, own, k = self._solid.columns, self._team, self._wall, self._solid.count, self._kernels
-        self.own_mass, known = team.empty(own), c.read("dust", "mass", "density")
-        team.run(k.keep_mass, own, start, *known, *self._corners, self.own_mass)
+    def cut(self, passage: Passage, start: Any, velocity: Any) -> WallMotion:
+        """Collective. Cut the cells where the particles are, which have moved from `start` (own, D) [m] with a
+        `velocity` (own, D) [m/s]."""
+        p, device, own, k, plan = self._particles, self._device, self._particles.count, self._kernels, passage.plan
+        # masses and velocities of all that are seen
+        own_mass = device.empty(own)
+        device.run(k.keep_mass, own, start, p.read("lone"), p.mass, p.density, self._domain, own_mass)
         vector = tuple((a,) for a in range(self._D))
-        self.velocity, self.mass = self.plan.exchange([(velocity, vector), (self.own_mass, ((),))])
-        (point,), size, plan = c.read("position"), self._points.volumes(c), self.plan
-        if self._split:
-            point, size, number = self._points.of(c, self._stretched)
-            plan = self._ghosts(point, number)
-        inside = team.empty((point.shape[0], 2))
-        team.run(k.keep_inside, point.shape[0], point, size, *self._corners, inside)
-        position, volume = plan.exchange([(point, "position"), (inside, ((), ()))])
-        bins = wall.sort(position, plan.key.device)
-        points = (plan.key.device, volume, position, *bins)
-        self.image, image = self._weigh_images(plan, point, size, points)
-        team.run(k.fade_images, plan.count, plan.key.device, image, 2, volume.reshape(-1))
-        if self._split:
-            self.image, image = self._weigh_images(self.plan, *c.read("position"), self._points.volumes(c), points)
-        team.run(k.fade_images, self.plan.count, self.plan.key.device, image, 1, self.mass)
-        ball = self.thickness.balls(c, plan, position, volume, bins, self._split)
-        wall.cut(position, volume, ball, plan.key.device, bins)
+        moving, mass = plan.exchange([(velocity, vector), (own_mass, ((),))])
+        # the points of the wall, with the images that count
+        position, size, points_plan = p.position, self._points.volumes(), plan
+        if passage.split:
+            position, size, number = self._points.of(passage.stretched)
+            points_plan = self._ghosts(position, number)
+        points = self._points_inside(points_plan, position, size)
+        image, faded = self._weigh_images(points_plan, position, size, points_plan, points)
+        device.run(k.fade_images, points_plan.count, points_plan.key.device, faded, 2, points.values.reshape(-1))
+        if passage.split:
+            image, faded = self._weigh_images(plan, p.position, self._points.volumes(), points_plan, points)
+        device.run(k.fade_images, plan.count, plan.key.device, faded, 1, mass)
+        # the cells
+        sphere = self.thin.spheres(points_plan, points, passage.split)
+        self._wall.cut(points, sphere, points_plan.key.device)
+        return WallMotion(passage, own_mass, mass, moving, image)
 
     def _ghosts(self, position: Any, id: np.ndarray) -> GhostPlan:
         """Collective. Who needs copies of which particles or points."""
-        return self._exchange.ghosts(position, id, self._wall.reach, image_reach=self._wall.images, mirrors=MIRRORS)
+        farthest = self._wall.ranges.farthest
+        return self._exchange.ghosts(position, id, self._wall.reach, image_reach=farthest, mirrors=MIRRORS)
 
-    def _weigh_images(self, plan: GhostPlan, place: Any, size: Any, points: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Collective. How much images along each axis count of the particles at a `place` (own, D) [m], of a `size`
+    def _points_inside(self, plan: GhostPlan, position: Any, size: Any) -> Cloud:
+        """Collective. The points of a plan; values (count, 2): what of the volume `size` (own, 1) [m^D] of each is in
+        the domain, and all of it."""
+        inside = self._device.empty((position.shape[0], 2))
+        self._device.run(self._kernels.keep_inside, position.shape[0], position, size, self._domain, inside)
+        position, volume = plan.exchange([(position, "position"), (inside, ((), ()))])
+        return Cloud(position, volume, self._wall.sort(position, plan.key.device))
+
+    def _weigh_images(
+        self, plan: GhostPlan, position: Any, size: Any, points_plan: GhostPlan, points: Cloud
+    ) -> tuple[Any, Any]:
+        """Collective. How much images along each axis count of the particles at a `position` (own, D) [m], of a `size`
         (own, 1) [m^D], beside the `points` of all bodies: (own, D) and (count, D) of the plan."""
-        own, wall = place.shape[0], self._wall
-        weight = self._team.empty((own, self._D))
-        known = (*self._corners, *wall.touching, wall.images, *points)
-        self._team.run(self._kernels.weigh_images, own, weight, place, size, *known)
+        own, key = position.shape[0], points_plan.key.device
+        weight, ranges = self._device.empty((own, self._D)), self._wall.ranges
+        self._device.run(self._kernels.weigh_images, own, weight, position, size, self._domain, ranges, key, points)
         (extended,) = plan.exchange([(weight, ((),) * self._D)])
         return weight, extended

@@ -1,4 +1,4 @@
-"""How much of an edge, a face and a cell is open, from the signed distances of their corners to the wall.
+"""Apertures of faces and volume fractions of cells: what is open of them, from the signed distances of their nodes.
 
 Distances are positive in the fluid and linear on the pieces into which faces and cells are cut: triangles between the
 edges and the middle of a face, tetrahedra between those and the middle of the cell. All parts are continuous in the
@@ -8,15 +8,15 @@ distances, 0 where none is positive, 1 where all are, and exact for a plane wall
 from distfsi.formulas.symbols import DIMENSIONS
 
 
-def open_segment(a, b):
-    """Part of an edge between corners at the distances a and b."""
+def segment_fraction(a, b):
+    """Open part of an edge between nodes at the distances a and b."""
     high, low = max(a, b), min(a, b)
     if_cut = high / (high - low)
     return 1.0 if low > 0.0 else (0.0 if high <= 0.0 else if_cut)
 
 
-def open_triangle(a, b, c):
-    """Part of a triangle."""
+def triangle_fraction(a, b, c):
+    """Open part of a triangle."""
     high, low = max(max(a, b), c), min(min(a, b), c)
     middle = max(min(a, b), min(max(a, b), c))
     corner = high * high / ((high - middle) * (high - low))
@@ -25,8 +25,8 @@ def open_triangle(a, b, c):
     return 1.0 if low > 0.0 else (0.0 if high <= 0.0 else if_cut)
 
 
-def open_tetrahedron(a, b, c, d):
-    """Part of a tetrahedron."""
+def tetrahedron_fraction(a, b, c, d):
+    """Open part of a tetrahedron."""
     high_ab, low_ab, high_cd, low_cd = max(a, b), min(a, b), max(c, d), min(c, d)
     first, last = max(high_ab, high_cd), min(low_ab, low_cd)
     x, y = min(high_ab, high_cd), max(low_ab, low_cd)
@@ -40,48 +40,53 @@ def open_tetrahedron(a, b, c, d):
     return 1.0 if last > 0.0 else (0.0 if first <= 0.0 else if_cut)
 
 
-def open_square(a, b, c, d):
-    """Part of a square with the corners (low, low), (high, low), (low, high), (high, high)."""
+def square_fraction(a, b, c, d):
+    """Open part of a square with the corners (low, low), (high, low), (low, high), (high, high)."""
     m = 0.25 * ((a + b) + (c + d))
-    near, far = open_triangle(m, a, b) + open_triangle(m, c, d), open_triangle(m, a, c) + open_triangle(m, b, d)
+    near, far = (
+        triangle_fraction(m, a, b) + triangle_fraction(m, c, d),
+        triangle_fraction(m, a, c) + triangle_fraction(m, b, d),
+    )
     if_cut = 0.25 * (near + far)
-    least = min(min(a, b), min(c, d))
-    return 1.0 if least > 0.0 else if_cut
+    minimum = min(min(a, b), min(c, d))
+    return 1.0 if minimum > 0.0 else if_cut
 
 
-def open_pyramid(m, a, b, c, d):
-    """Part of a pyramid from a cell's middle, at the distance m, to one of its faces."""
+def pyramid_fraction(m, a, b, c, d):
+    """Open part of a pyramid from a cell's middle, at the distance m, to one of its faces."""
     f = 0.25 * ((a + b) + (c + d))
-    near = open_tetrahedron(m, f, a, b) + open_tetrahedron(m, f, c, d)
-    return 0.25 * (near + (open_tetrahedron(m, f, a, c) + open_tetrahedron(m, f, b, d)))
+    near = tetrahedron_fraction(m, f, a, b) + tetrahedron_fraction(m, f, c, d)
+    return 0.25 * (near + (tetrahedron_fraction(m, f, a, c) + tetrahedron_fraction(m, f, b, d)))
 
 
-def open_cube(a, b, c, d, e, f, g, h):
-    """Part of a cube; x runs fastest, then y, then z, over its corners."""
+def cube_fraction(a, b, c, d, e, f, g, h):
+    """Open part of a cube; x runs fastest, then y, then z, over its corners."""
     m = 0.125 * (((a + b) + (c + d)) + ((e + f) + (g + h)))
-    x = open_pyramid(m, a, c, e, g) + open_pyramid(m, b, d, f, h)
-    y = open_pyramid(m, a, b, e, f) + open_pyramid(m, c, d, g, h)
-    z = open_pyramid(m, a, b, c, d) + open_pyramid(m, e, f, g, h)
+    x = pyramid_fraction(m, a, c, e, g) + pyramid_fraction(m, b, d, f, h)
+    y = pyramid_fraction(m, a, b, e, f) + pyramid_fraction(m, c, d, g, h)
+    z = pyramid_fraction(m, a, b, c, d) + pyramid_fraction(m, e, f, g, h)
     if_cut = (x + y + z) / 6.0
-    least = min(min(min(a, b), min(c, d)), min(min(e, f), min(g, h)))
-    return 1.0 if least > 0.0 else if_cut
+    minimum = min(min(min(a, b), min(c, d)), min(min(e, f), min(g, h)))
+    return 1.0 if minimum > 0.0 else if_cut
 
 
-def open_face(corners):
-    """Part of a face that is open, from its 1, 2 or 4 corners."""
+def aperture_of(corners):
+    """Open part of a face, from its 1, 2 or 4 corners."""
     if DIMENSIONS == 1:
         return 1.0 if corners[0] > 0.0 else 0.0
     if DIMENSIONS == 2:
-        return open_segment(corners[0], corners[1])
+        return segment_fraction(corners[0], corners[1])
     if DIMENSIONS == 3:
-        return open_square(corners[0], corners[1], corners[2], corners[3])
+        return square_fraction(corners[0], corners[1], corners[2], corners[3])
 
 
-def open_cell(corners):
-    """Part of a cell that is open, from its 2, 4 or 8 corners."""
+def volume_fraction_of(corners):
+    """Open part of a cell, from its 2, 4 or 8 corners."""
     if DIMENSIONS == 1:
-        return open_segment(corners[0], corners[1])
+        return segment_fraction(corners[0], corners[1])
     if DIMENSIONS == 2:
-        return open_square(corners[0], corners[1], corners[2], corners[3])
+        return square_fraction(corners[0], corners[1], corners[2], corners[3])
     if DIMENSIONS == 3:
-        return open_cube(corners[0], corners[1], corners[2], corners[3], corners[4], corners[5], corners[6], corners[7])
+        return cube_fraction(
+            corners[0], corners[1], corners[2], corners[3], corners[4], corners[5], corners[6], corners[7]
+        )

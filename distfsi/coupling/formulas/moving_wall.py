@@ -1,23 +1,24 @@
-"""What a moving wall does to a cell: the pressure on it, the content that fluxes and wall leave, mixed contents.
+"""What a moving wall does to a cell: the pressure on it, the content that fluxes and wall leave, and its state.
 
-The content of a cell is Q = v U, where v is the part of its volume that the fluid fills: not the geometric one but the
-one that the fluxes have swept, so that a uniform flow stays uniform. For two phases the energies of both belong to the
-content until they are relaxed.
+The conserved content of a cell is Q = v U, where v is its fluid volume fraction: not the geometric one but the one that
+the fluxes leave by the geometric conservation law, so that a uniform flow stays uniform. For two phases the energies of
+both belong to the content until they are relaxed.
 """
 
 from math import pow, sqrt
 
 from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_change
 from distfsi.fluid.formulas.six_equation import phase_energies
+from distfsi.fluid.formulas.stiffness import exponent_1, weight_1
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     DIMENSIONS,
-    GRAVITY,
     MINIMUM_FRACTION,
-    OMEGA_1,
-    OMEGA_2,
     PHASES,
     VARIABLES,
+    grueneisen_1,
+    grueneisen_2,
     primitives,
     reference_1,
     reference_2,
@@ -27,34 +28,45 @@ from distfsi.formulas.tensors import dot
 
 
 def growth(W):
-    """1 + omega of the stiffened gas with the same bulk modulus; both phases share a mixture's pressure change."""
+    """Exponent of the stiffened gas with the same bulk modulus; both phases share a mixture's pressure change."""
     if PHASES == 1:
-        return 1.0 + OMEGA_1
+        return exponent_1(W[0])
     else:
         a1 = W[3 + DIMENSIONS]
-        return 1.0 + 1.0 / (a1 * (1.0 / OMEGA_1) + (1.0 - a1) * (1.0 / OMEGA_2))
+        omega1, omega_slope1 = grueneisen_1(W[0])
+        omega2, omega_slope2 = grueneisen_2(W[1])
+        return 1.0 + 1.0 / (a1 * (1.0 / omega1) + (1.0 - a1) * (1.0 / omega2))
+
+
+def weight(W):
+    """1, but for a fluid whose omega depends on its density (fluid/formulas/stiffness.py)."""
+    if PHASES == 1:
+        return weight_1(W[0])
+    else:
+        return 1.0
 
 
 def wall_pressure(U, W, approach):
     """Pressure [Pa] on a wall that the fluid approaches at this speed: a shock, or a fan if it recedes.
 
-    Exact for ideal and stiffened gas; else for the stiffened gas with the same rho c^2.
+    Exact for ideal, stiffened, Noble-Abel and Noble-Abel stiffened gas; else for such a gas with the same rho c^2.
     """
     rho = sum(U[v] for v in static_range(PHASES))
     p, c, gamma = W[PHASES + DIMENSIONS], sound_speed(W), growth(W)
+    g = weight(W)
     stiff = rho * c * c / gamma
     square = rho * approach * approach
-    b = 0.5 * (gamma + 1.0) * square
+    b = 0.5 * (gamma + g) * square
     shock = 0.5 * b + sqrt(0.25 * b * b + gamma * stiff * square)
-    q = max(1.0 + 0.5 * (gamma - 1.0) * approach / c, 0.0)
-    fan = stiff * (pow(q, 2.0 * gamma / (gamma - 1.0)) - 1.0)
+    q = max(1.0 + 0.5 * (gamma - g) * approach / c, 0.0)
+    fan = stiff * (pow(q, 2.0 * gamma / (gamma - g)) - 1.0)
     return p + (shock if approach >= 0.0 else fan)
 
 
 def wall_impedance(U, W, approach):
     """By how much wall_pressure() falls [Pa s/m] when the wall goes faster: not more than this, and that in sound."""
     rho = sum(U[v] for v in static_range(PHASES))
-    return rho * (sound_speed(W) + (growth(W) + 1.0) * max(approach, 0.0))
+    return rho * (sound_speed(W) + (growth(W) + weight(W)) * max(approach, 0.0))
 
 
 def with_energies(U, volume):
@@ -66,16 +78,16 @@ def with_energies(U, volume):
         return (*(volume * U[v] for v in static_range(VARIABLES)), volume * e1, volume * e2)
 
 
-def stage_content(U_n, U, v_n, v, D, swept, b, dt):
+def stage_content(U_n, U, v_n, v, D, freed, b, dt):
     """Content after a stage of a cell that held U_n in v_n before the step and holds U in v now.
 
-    D: dt times the divergence of the fluxes through the open parts of its faces, the wall's included; swept: the part
+    D: dt times the divergence of the fluxes through the open parts of its faces, the wall's included; freed: the part
     of the cell that the wall has freed.
     """
     Q_n, Q = with_energies(U_n, v_n), with_energies(U, v)
     rho = sum(Q[k] for k in static_range(PHASES))
-    force = tuple(dt * (GRAVITY[d] * rho) for d in static_range(DIMENSIONS))
-    work = dt * sum(GRAVITY[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
+    force = tuple(dt * (BODY_FORCE[d] * rho) for d in static_range(DIMENSIONS))
+    work = dt * sum(BODY_FORCE[d] * Q[PHASES + d] for d in static_range(DIMENSIONS))
     E = PHASES + DIMENSIONS
     transported = (
         *(Q_n[k] + b * (Q[k] - D[k] - Q_n[k]) for k in static_range(PHASES)),
@@ -88,7 +100,7 @@ def stage_content(U_n, U, v_n, v, D, swept, b, dt):
     if PHASES == 1:
         return transported
     else:
-        growth_of_volume = D[VARIABLES + 2] + swept
+        growth_of_volume = D[VARIABLES + 2] + freed
         W = primitives(U)
         a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
         w1, w2 = a1 * p * growth_of_volume, (1.0 - a1) * p * growth_of_volume
@@ -109,8 +121,10 @@ def state_before_relaxation(Q, volume):
     p = W[2 + DIMENSIONS]
     ref1, slope1 = reference_1(W[0])
     ref2, slope2 = reference_2(W[1])
-    excess1 = OMEGA_1 * (Q[VARIABLES] / volume) - a1 * (p - ref1)
-    excess2 = OMEGA_2 * (Q[VARIABLES + 1] / volume) - a2 * (p - ref2)
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    excess1 = omega1 * (Q[VARIABLES] / volume) - a1 * (p - ref1)
+    excess2 = omega2 * (Q[VARIABLES + 1] / volume) - a2 * (p - ref2)
     return (U, phases_before(p, a1, 0.0, U[0], U[1], ref1, ref2, excess1, excess2))
 
 

@@ -7,14 +7,15 @@ At faces the velocity components are rotated so that the normal one comes first.
 from math import sqrt
 
 from distfsi.fluid.formulas.riemann import contact_speed
+from distfsi.fluid.formulas.stiffness import weight_1
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     DIMENSIONS,
-    GRAVITY,
-    OMEGA_1,
     VARIABLES,
     bounding_speeds,
     contact_jump_diffusion,
+    grueneisen_1,
     reference_1,
     slip_viscosity,
     stored_reference_1,
@@ -27,7 +28,8 @@ def primitives(U):
     velocity = tuple(U[1 + d] / rho for d in static_range(DIMENSIONS))
     kinetic = 0.5 * sum(U[1 + d] * velocity[d] for d in static_range(DIMENSIONS))
     reference, slope = stored_reference_1(rho)
-    p = OMEGA_1 * (U[1 + DIMENSIONS] - kinetic) + reference
+    omega, omega_slope = grueneisen_1(rho)
+    p = omega * (U[1 + DIMENSIONS] - kinetic) + reference
     return (rho, *(velocity[d] for d in static_range(DIMENSIONS)), p)
 
 
@@ -39,15 +41,17 @@ def conserved(W):
 def total_energy(W):
     """rho E [J/m3]."""
     reference, slope = stored_reference_1(W[0])
+    omega, omega_slope = grueneisen_1(W[0])
     kinetic = 0.5 * W[0] * sum(W[1 + d] * W[1 + d] for d in static_range(DIMENSIONS))
-    return (W[1 + DIMENSIONS] - reference) / OMEGA_1 + kinetic
+    return (W[1 + DIMENSIONS] - reference) / omega + kinetic
 
 
 def bulk_modulus(W):
-    """rho c^2 [Pa] = rho d reference/d rho + p - reference + omega p (paper, Eq. 23)."""
+    """rho c^2 [Pa] (paper, Eq. 23; stiffness.py)."""
     reference, slope = reference_1(W[0])
+    omega, omega_slope = grueneisen_1(W[0])
     p = W[1 + DIMENSIONS]
-    return W[0] * slope + (p - reference + OMEGA_1 * p)
+    return W[0] * slope + (weight_1(W[0]) * (p - reference) + omega * p)
 
 
 def sound_speed(W):
@@ -106,11 +110,11 @@ def updated(U_n, U, W, D, b, dt):
     the bit.
     """
     rho = U[0]
-    work = sum(GRAVITY[d] * U[1 + d] for d in static_range(DIMENSIONS))
+    work = sum(BODY_FORCE[d] * U[1 + d] for d in static_range(DIMENSIONS))
     return (
         U_n[0] + b * (U[0] - D[0] - U_n[0]),
         *(
-            U_n[1 + d] + b * (U[1 + d] - D[1 + d] + dt * (GRAVITY[d] * rho) - U_n[1 + d])
+            U_n[1 + d] + b * (U[1 + d] - D[1 + d] + dt * (BODY_FORCE[d] * rho) - U_n[1 + d])
             for d in static_range(DIMENSIONS)
         ),
         U_n[1 + DIMENSIONS] + b * (U[1 + DIMENSIONS] - D[1 + DIMENSIONS] + dt * work - U_n[1 + DIMENSIONS]),

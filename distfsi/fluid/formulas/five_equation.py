@@ -17,8 +17,17 @@ from distfsi.fluid.formulas.six_equation import (
     total_energy,
     updated_conserved,
 )
+from distfsi.fluid.formulas.stiffness import weight_1, weight_2
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FLUXES, MINIMUM_FRACTION, OMEGA_1, OMEGA_2, reference_1, reference_2
+from distfsi.formulas.symbols import (
+    DIMENSIONS,
+    FLUXES,
+    MINIMUM_FRACTION,
+    grueneisen_1,
+    grueneisen_2,
+    reference_1,
+    reference_2,
+)
 
 __all__ = ["behind_wave", "bulk_modulus", "conserved", "face_flux", "primitives", "sound_speed", "updated"]
 
@@ -28,9 +37,11 @@ def bulk_modulus(W):
     p = W[2 + DIMENSIONS]
     reference1, slope1 = reference_1(W[0])
     reference2, slope2 = reference_2(W[1])
-    bulk1 = W[0] * slope1 + (p - reference1) + OMEGA_1 * p
-    bulk2 = W[1] * slope2 + (p - reference2) + OMEGA_2 * p
-    share1, share2 = W[3 + DIMENSIONS] * (1.0 / OMEGA_1), (1.0 - W[3 + DIMENSIONS]) * (1.0 / OMEGA_2)
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    bulk1 = W[0] * slope1 + weight_1(W[0]) * (p - reference1) + omega1 * p
+    bulk2 = W[1] * slope2 + weight_2(W[1]) * (p - reference2) + omega2 * p
+    share1, share2 = W[3 + DIMENSIONS] * (1.0 / omega1), (1.0 - W[3 + DIMENSIONS]) * (1.0 / omega2)
     return (share1 * bulk1 + share2 * bulk2) / (share1 + share2)
 
 

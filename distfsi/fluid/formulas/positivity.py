@@ -31,20 +31,20 @@ def partial_masses(W):
         return (W[3 + DIMENSIONS] * W[0], (1.0 - W[3 + DIMENSIONS]) * W[1])
 
 
-def reserve(left, right, F, c, rate):
+def limiter_indicator(left, right, F, c, rate):
     """Negative where the flux F between the cell means `left` and `right` may need limiting; cheap.
 
-    c: the smaller sound speed at the face [m/s]. The flux of a smooth flow leaves a positive reserve.
+    c: the smaller sound speed at the face [m/s]. It is positive for the flux of a smooth flow.
     """
     slip = sum(abs(right[PHASES + d] - left[PHASES + d]) for d in static_range(DIMENSIONS))
     jump = abs(right[PHASES + DIMENSIONS] - left[PHASES + DIMENSIONS])
     mass_l, mass_r = partial_masses(left), partial_masses(right)
     impedance = c * min(sum(mass_l[k] for k in static_range(PHASES)), sum(mass_r[k] for k in static_range(PHASES)))
-    least = min(MILD_SLIP * c - slip, impedance * (MILD_WORK - rate * slip) - rate * jump)
+    lowest = min(MILD_SLIP * c - slip, impedance * (MILD_WORK - rate * slip) - rate * jump)
     share_l, share_r = (1.0 - FLOOR) + rate * left[PHASES], (1.0 - FLOOR) - rate * right[PHASES]
     for k in static_range(PHASES):
-        least = min(least, min(mass_l[k] * share_l - rate * F[k], mass_r[k] * share_r + rate * F[k]))
-    return least
+        lowest = min(lowest, min(mass_l[k] * share_l - rate * F[k], mass_r[k] * share_r + rate * F[k]))
+    return lowest
 
 
 def margins(W, F, rate):

@@ -1,15 +1,15 @@
 """How a primitive varies inside a cell: from the means of cells in a row, its own in their middle, to its two faces.
 
-Each formula returns (rise from the low face to the mean, rise from the mean to the high face). A volume fraction may be
-reconstructed more sharply than the rest: phase densities, velocity and pressure are primitives beside it, so masses and
-energies of the phases follow it, and where velocity and pressure are uniform they stay so.
+Each formula returns the face increments: from the low face to the mean, and from the mean to the high face. A volume
+fraction may be reconstructed more sharply than the rest: phase densities, velocity and pressure are primitives beside
+it, so masses and energies of the phases follow it, and where velocity and pressure are uniform they stay so.
 """
 
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import GHOSTS, limited_slope
 
 UNEVEN = 1e-6  # of all three roughnesses: what weighs as none; so that no unit matters
-LEAST_PART = 0.1  # of a cell's mean that a face keeps where the cells around have one sign
+SMALLEST_PART = 0.1  # of a cell's mean that a face keeps where the cells around have one sign
 
 
 def differences(cells):
@@ -20,8 +20,8 @@ def differences(cells):
 def muscl(cells):
     """A straight line with a limited slope."""
     backward, forward = differences(cells)
-    rise = 0.5 * limited_slope(backward, forward)
-    return (rise, rise)
+    increment = 0.5 * limited_slope(backward, forward)
+    return (increment, increment)
 
 
 def overbee(cells):
@@ -29,12 +29,12 @@ def overbee(cells):
     Comput. Phys. 340, 2017). A steeper profile, as THINC's can be, could empty a cell of a phase in one step."""
     backward, forward = differences(cells)
     smaller = min(abs(backward), abs(forward))
-    rise = smaller if backward > 0.0 else -smaller
-    kept = rise if backward * forward > 0.0 else 0.0
+    increment = smaller if backward > 0.0 else -smaller
+    kept = increment if backward * forward > 0.0 else 0.0
     return (kept, kept)
 
 
-def curved_rise(d1, d2, d3, d4):
+def weno_increment(d1, d2, d3, d4):
     """From a cell's mean to its face, between the cells whose difference is d3; d1 … d4: between five cells in a row.
 
     Of fifth order where the primitive is smooth (WENO-Z: Borges, Carmona, Costa, Don, J. Comput. Phys. 227, 2008).
@@ -55,9 +55,9 @@ def weno5(cells):
     """Five cells; a straight line where a face would come near zero or beyond, and the cells do not."""
     d1, d2, d3, d4 = tuple(cells[k + 1] - cells[k] for k in static_range(4))
     mean = cells[2]
-    low, high = curved_rise(d4, d3, d2, d1), curved_rise(d1, d2, d3, d4)
+    low, high = weno_increment(d4, d3, d2, d1), weno_increment(d1, d2, d3, d4)
     straight = 0.5 * limited_slope(d2, d3)
     one_sign = min(cells[1] * mean, mean * cells[3]) > 0.0
-    least = LEAST_PART * (mean * mean)
-    crosses_low, crosses_high = (mean - low) * mean < least, (mean + high) * mean < least
+    smallest = SMALLEST_PART * (mean * mean)
+    crosses_low, crosses_high = (mean - low) * mean < smallest, (mean + high) * mean < smallest
     return (straight if one_sign and crosses_low else low, straight if one_sign and crosses_high else high)

@@ -9,18 +9,19 @@ from math import sqrt
 
 from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_change
 from distfsi.fluid.formulas.riemann import contact_speed
+from distfsi.fluid.formulas.stiffness import held_compression_1, held_compression_2, weight_1, weight_2
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    BODY_FORCE,
     CLOSED_FORM,
     DIMENSIONS,
     FLUXES,
-    GRAVITY,
     MINIMUM_FRACTION,
-    OMEGA_1,
-    OMEGA_2,
     VARIABLES,
     bounding_speeds,
     contact_jump_diffusion,
+    grueneisen_1,
+    grueneisen_2,
     reference_1,
     reference_2,
     slip_viscosity,
@@ -41,8 +42,10 @@ def primitives(U):
     kinetic = 0.5 * sum(U[2 + d] * velocity[d] for d in static_range(DIMENSIONS))
     reference1, slope1 = stored_reference_1(rho1)
     reference2, slope2 = stored_reference_2(rho2)
-    energy = U[2 + DIMENSIONS] - kinetic + a1 * (reference1 / OMEGA_1) + a2 * (reference2 / OMEGA_2)
-    p = energy / (a1 * (1.0 / OMEGA_1) + a2 * (1.0 / OMEGA_2))
+    omega1, omega_slope1 = grueneisen_1(rho1)
+    omega2, omega_slope2 = grueneisen_2(rho2)
+    energy = U[2 + DIMENSIONS] - kinetic + a1 * (reference1 / omega1) + a2 * (reference2 / omega2)
+    p = energy / (a1 * (1.0 / omega1) + a2 * (1.0 / omega2))
     return (rho1, rho2, *(velocity[d] for d in static_range(DIMENSIONS)), p, a1)
 
 
@@ -61,7 +64,9 @@ def total_energy(W):
     p = W[2 + DIMENSIONS]
     reference1, slope1 = stored_reference_1(W[0])
     reference2, slope2 = stored_reference_2(W[1])
-    internal = a1 * ((p - reference1) / OMEGA_1) + a2 * ((p - reference2) / OMEGA_2)
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    internal = a1 * ((p - reference1) / omega1) + a2 * ((p - reference2) / omega2)
     squared = sum(W[2 + d] * W[2 + d] for d in static_range(DIMENSIONS))
     return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared
 
@@ -71,7 +76,9 @@ def phase_energies(W):
     a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
     ref1, slope1 = reference_1(W[0])
     ref2, slope2 = reference_2(W[1])
-    return (a1 * ((p - ref1) * (1.0 / OMEGA_1)), (1.0 - a1) * ((p - ref2) * (1.0 / OMEGA_2)))
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    return (a1 * ((p - ref1) * (1.0 / omega1)), (1.0 - a1) * ((p - ref2) * (1.0 / omega2)))
 
 
 def bulk_modulus(W):
@@ -81,8 +88,10 @@ def bulk_modulus(W):
     p = W[2 + DIMENSIONS]
     reference1, slope1 = reference_1(W[0])
     reference2, slope2 = reference_2(W[1])
-    bulk1 = W[0] * slope1 + (p - reference1) + OMEGA_1 * p
-    bulk2 = W[1] * slope2 + (p - reference2) + OMEGA_2 * p
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    bulk1 = W[0] * slope1 + weight_1(W[0]) * (p - reference1) + omega1 * p
+    bulk2 = W[1] * slope2 + weight_2(W[1]) * (p - reference2) + omega2 * p
     return a1 * bulk1 + a2 * bulk2
 
 
@@ -96,15 +105,16 @@ def mixture_density(W):
     return W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
 
 
-def energy_behind_wave(rho, p, chi, reference, reference_behind, OMEGA):
+def energy_behind_wave(p, chi, excess, reference_behind, omega):
     """rho e of one phase behind a wave that compresses it by chi: the phase's own Hugoniot (in place of Eq. 27).
 
-    The pressure grows without bound at the limiting compression; beyond 0.9 of it the denominator is held.
+    excess: omega rho e in front of the wave, with the omega behind it. The pressure grows without bound at the limiting
+    compression; beyond 0.9 of it the denominator is held.
     """
     y = 1.0 / chi
-    growth = max(y - 0.5 * OMEGA * (1.0 - y), 0.1 * y)
-    p_behind = (p - reference + reference_behind * y + 0.5 * OMEGA * p * (1.0 - y)) / growth
-    return (p_behind - reference_behind) / OMEGA
+    growth = max(y - 0.5 * omega * (1.0 - y), 0.1 * y)
+    p_behind = (excess + reference_behind * y + 0.5 * omega * p * (1.0 - y)) / growth
+    return (p_behind - reference_behind) / omega
 
 
 def behind_wave(W, s, u_face):
@@ -117,12 +127,16 @@ def behind_wave(W, s, u_face):
     rho = a1 * W[0] + a2 * W[1]
     chi = (s - u) / (s - u_face)  # compression; 1 if no wave passes
     energy = chi * (total_energy(W) + (u_face - u) * (rho * u_face + p / (s - u)))
-    rho1, rho2 = chi * W[0], chi * W[1]
+    chi1, chi2 = held_compression_1(chi, W[0]), held_compression_2(chi, W[1])
     before1, slope1 = reference_1(W[0])
     before2, slope2 = reference_2(W[1])
-    behind1, slope1b = reference_1(rho1)
-    behind2, slope2b = reference_2(rho2)
-    mass1, mass2 = a1 * rho1, a2 * rho2
+    behind1, slope1b = reference_1(chi1 * W[0])
+    behind2, slope2b = reference_2(chi2 * W[1])
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    omega1b, omega_slope1b = grueneisen_1(chi1 * W[0])
+    omega2b, omega_slope2b = grueneisen_2(chi2 * W[1])
+    mass1, mass2 = a1 * (chi * W[0]), a2 * (chi * W[1])
     mass = mass1 + mass2
     return (
         mass1,
@@ -131,8 +145,8 @@ def behind_wave(W, s, u_face):
         *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
         energy,
         a1,
-        a1 * energy_behind_wave(W[0], p, chi, before1, behind1, OMEGA_1),
-        a2 * energy_behind_wave(W[1], p, chi, before2, behind2, OMEGA_2),
+        a1 * energy_behind_wave(p, chi1, omega1b / omega1 * (p - before1), behind1, omega1b),
+        a2 * energy_behind_wave(p, chi2, omega2b / omega2 * (p - before2), behind2, omega2b),
         1.0,
     )
 
@@ -180,12 +194,12 @@ def face_flux(left, right, jump):
 def updated_conserved(U_n, U, D, b, dt):
     """U_n + b (U - D + dt S - U_n) of masses, momentum and total energy; S is the body force and its work."""
     rho = U[0] + U[1]
-    work = sum(GRAVITY[d] * U[2 + d] for d in static_range(DIMENSIONS))
+    work = sum(BODY_FORCE[d] * U[2 + d] for d in static_range(DIMENSIONS))
     return (
         U_n[0] + b * (U[0] - D[0] - U_n[0]),
         U_n[1] + b * (U[1] - D[1] - U_n[1]),
         *(
-            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (GRAVITY[d] * rho) - U_n[2 + d])
+            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (BODY_FORCE[d] * rho) - U_n[2 + d])
             for d in static_range(DIMENSIONS)
         ),
         U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS]),
@@ -210,11 +224,19 @@ def before_relaxation(U_n, U, W, D, b, dt):
     reference2_n, slope2_n = reference_2(W_n[1])
     reference1, slope1 = reference_1(W[0])
     reference2, slope2 = reference_2(W[1])
-    e1_n, e1 = a1_n * ((p_n - reference1_n) / OMEGA_1), a1 * ((p - reference1) / OMEGA_1)
-    e2_n, e2 = a2_n * ((p_n - reference2_n) / OMEGA_2), a2 * ((p - reference2) / OMEGA_2)
+    omega1_n, omega_slope1_n = grueneisen_1(W_n[0])
+    omega2_n, omega_slope2_n = grueneisen_2(W_n[1])
+    omega1, omega_slope1 = grueneisen_1(W[0])
+    omega2, omega_slope2 = grueneisen_2(W[1])
+    e1_n, e1 = a1_n * ((p_n - reference1_n) / omega1_n), a1 * ((p - reference1) / omega1)
+    e2_n, e2 = a2_n * ((p_n - reference2_n) / omega2_n), a2 * ((p - reference2) / omega2)
     de1 = b * (e1 - D[VARIABLES] + a1 * p * -du - e1_n)
     de2 = b * (e2 - D[VARIABLES + 1] + a2 * p * -du - e2_n)
-    phases = phases_before(p_n, a1_n + da, da, m1, m2, reference1_n, reference2_n, OMEGA_1 * de1, OMEGA_2 * de2)
+    omega1_new, omega_slope1_new = grueneisen_1(m1 / (a1_n + da))
+    omega2_new, omega_slope2_new = grueneisen_2(m2 / (1.0 - (a1_n + da)))
+    we1 = omega1_new * de1 + (omega1_new / omega1_n - 1.0) * (a1_n * (p_n - reference1_n))
+    we2 = omega2_new * de2 + (omega2_new / omega2_n - 1.0) * (a2_n * (p_n - reference2_n))
+    phases = phases_before(p_n, a1_n + da, da, m1, m2, reference1_n, reference2_n, we1, we2)
     return (phases, da)
 
 

@@ -1,6 +1,6 @@
-// The loops of fluid/kernels/stage.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
+// The loops of fluid/kernels/stage.py and signals.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, FINISHES, CURVED, SHARPENED, LOOKS_SIDEWAYS; the formulas by their
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, BISECTION_FALLBACK, ASYMMETRIC, SHARPENED, TRANSVERSE_SENSOR; the formulas by their
 // names, whose first argument are the `numbers` of the scene, NUMBERS; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
@@ -17,22 +17,22 @@ template <int N, int K = 0> DEVICE auto tuple_of(const real *values, int step = 
         return joined(values[K * step], tuple_of<N, K + 1>(values, step));
 }
 
-DEVICE void put(Tuple<>, real *, long long) {}
+DEVICE void set(Tuple<>, real *, long long) {}
 
-template <class... R> DEVICE void put(Tuple<real, R...> tuple, real *values, long long step)
+template <class... R> DEVICE void set(Tuple<real, R...> tuple, real *values, long long step)
 {
     *values = tuple.head;
-    put(tuple.tail, values + step, step);
+    set(tuple.tail, values + step, step);
 }
 
 DEVICE constexpr bool is_velocity(int v) { return v >= PHASES && v < PHASES + DIMENSIONS; }
 
-// The variable that stands at place v when the velocity along `axis` comes first, and where variable v stands then.
-DEVICE constexpr int rotated(int v, int axis)
+// The variable that stands at position v when the velocity along `axis` comes first, and where variable v stands then.
+DEVICE constexpr int variable_at(int v, int axis)
 {
     return is_velocity(v) ? PHASES + (v - PHASES + axis) % DIMENSIONS : v;
 }
-DEVICE constexpr int place(int v, int axis)
+DEVICE constexpr int position_of(int v, int axis)
 {
     return is_velocity(v) ? PHASES + (v - PHASES + DIMENSIONS - axis) % DIMENSIONS : v;
 }
@@ -48,7 +48,7 @@ constexpr int SP = SLOTS * PLANE;
 constexpr int ROW = TILE_X + 1;  // of faces
 constexpr int FACES = ROW * (TILE_Y + (DIMENSIONS > 1 ? 1 : 0));
 constexpr int CONSERVED = PHASES + DIMENSIONS + 1;
-constexpr real LEAST_VOLUME = HALF;
+constexpr real MINIMUM_VOLUME = HALF;
 constexpr int HALVINGS = 80;
 constexpr int KEPT = DIMENSIONS > 2 && PHASES > 1 ? 3 * FLUXES * THREADS : 0;  // what registers do not hold
 constexpr int APART = KEPT > 0 ? THREADS : 1;  // the values of a thread
@@ -79,8 +79,8 @@ template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int
     return jump;
 }
 
-// How far variable v rises from the low face of a cell to its mean and from there to its high face.
-template <int AXIS> DEVICE auto rises(const auto &numbers, const real *W, bool sharp, int i, int j, int k)
+// Increments of a variable from the low face of a cell to its mean and from there to its high face.
+template <int AXIS> DEVICE auto increments(const auto &numbers, const real *W, bool sharp, int i, int j, int k)
 {
     real values[2 * GHOSTS - 1];
 #pragma unroll
@@ -98,23 +98,23 @@ DEVICE bool flux(const auto &numbers, const real *P, int i, int j, int k, real r
     const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
-        const real *W = P + rotated(v, AXIS) * SP;
+        const real *W = P + variable_at(v, AXIS) * SP;
         const bool sharp = v == VARIABLES - 1;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + item<1>(rises<AXIS>(numbers, W, sharp, i, j, k));
-        right[v] = W[high] - item<0>(rises<AXIS>(numbers, W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+        left[v] = W[low] + item<1>(increments<AXIS>(numbers, W, sharp, i, j, k));
+        right[v] = W[high] - item<0>(increments<AXIS>(numbers, W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
-    if constexpr (LOOKS_SIDEWAYS) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
+    if constexpr (TRANSVERSE_SENSOR) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
     const auto L = tuple_of<VARIABLES>(left), R = tuple_of<VARIABLES>(right);
-    put(face_flux(numbers, L, R, jump), F, step);
+    set(face_flux(numbers, L, R, jump), F, step);
     for (int v = 0; v < FLUXES; v++) value[v] = F[v * step];
     const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
     const auto f = tuple_of<FLUXES>(value);
     real c = minimum(sound_speed(numbers, L), sound_speed(numbers, R));
-    if constexpr (CURVED) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
-    if (!(reserve(numbers, l, r, f, c, rate) < 0) || is_admissible(numbers, l, r, f, rate)) return false;
-    put(limited_flux(numbers, l, r, f, jump, rate), F, step);
+    if constexpr (ASYMMETRIC) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
+    if (!(limiter_indicator(numbers, l, r, f, c, rate) < 0) || is_admissible(numbers, l, r, f, rate)) return false;
+    set(limited_flux(numbers, l, r, f, jump, rate), F, step);
     return true;
 }
 
@@ -127,7 +127,7 @@ DEVICE void load_plane(const auto &numbers, const real *U, real *P, int k, int n
             real state[VARIABLES];
 #pragma unroll
             for (int v = 0; v < VARIABLES; v++) state[v] = u[v * su];
-            put(primitives(numbers, tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
+            set(primitives(numbers, tuple_of<VARIABLES>(state)), P + cell(i, j, k), SP);
         }
     }
 }
@@ -148,10 +148,10 @@ DEVICE bool is_unlike(const real *U, const real *first, int n, int m, int l, int
 
 // Add the flux through n faces of a domain side, `step` apart, to what has left through it; and that of as many `rows`
 // as are alike. Always in the same order.
-DEVICE void book(double *through, const real *F, int axis, int step, int n, int rows, double weight)
+DEVICE void account(double *through, const real *F, int axis, int step, int n, int rows, double weight)
 {
     for (int v = threadIdx.x; v < CONSERVED; v += THREADS) {
-        const real *values = F + place(v, axis) * FACES;
+        const real *values = F + position_of(v, axis) * FACES;
         real total = values[0];
 #pragma unroll 1
         for (int i = 1; i < n; i++) total = total + values[i * step];
@@ -165,16 +165,16 @@ template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> befor
                                           real *U_new, long long su)
 {
     const auto state = updated(numbers, before, now, W, D, b, dt);
-    if constexpr (!FINISHES) {
-        put(state, U_new, su);
+    if constexpr (!BISECTION_FALLBACK) {
+        set(state, U_new, su);
     } else {
         real values[VARIABLES + 1];
-        put(state, values, 1);
+        set(state, values, 1);
 #pragma unroll
         for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
         if (values[VARIABLES] >= 0) return;
         const auto start = before_relaxation(numbers, before, now, W, D, b, dt);
-        auto range = range_of_change(numbers, item<1>(item<0>(start)));
+        auto range = range_of_change(numbers, item<0>(start));
 #pragma unroll 1
         for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
         U_new[(VARIABLES - 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
@@ -190,30 +190,35 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const auto numbers = NUMBERS;
     real *P = (real *)shared, *F = P + VARIABLES * SP;
     const int tx = threadIdx.x % TILE_X, ty = threadIdx.x / TILE_X;
-    const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
+    const long long sy = states_now_4, sz = sy * states_now_3, su = sz * states_now_2;
     const long long at = begin + blockIdx.x;
-    const long long t = chosen[at], *tile = tiles + t * tiles_1;
+    const long long t = chosen[at], *tile = tiles_table + t * tiles_table_1;
     const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
     const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
-    const bool is_calm = calm[t];
+
+    // whether all cells that the tile reads hold one state
+    const bool is_calm = tiles_calm[t];
     bool uniform = is_calm;
     if (!is_calm) {
-        const real *corner = U + u0 - GZ * sz - GY * sy - GHOSTS;
+        const real *corner = states_now + u0 - GZ * sz - GY * sy - GHOSTS;
         const bool unlike = is_unlike(corner, corner, nx + 2 * GHOSTS, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
-                            || is_unlike(U_n + u0, U_n + u0, nx, ny, nz, tx, ty, sy, sz, su);
+                            || is_unlike(states_before + u0, states_before + u0, nx, ny, nz, tx, ty, sy, sz, su);
         uniform = __syncthreads_count(unlike) == 0;
     }
+
+    // what is computed of it, and what it stands for
     const int n = uniform ? 1 : nx, m = uniform ? 1 : ny, l = uniform ? 1 : nz, step = uniform ? 0 : 1;
     const int x_alike = uniform ? ny * nz : 1, y_alike = uniform ? nz : 1, z_alike = uniform ? ny : 1;
     const bool inside = tx < n && ty < m;
-    double *out = through + t * 6 * CONSERVED;
+    double *out = tiles_through + t * 6 * CONSERVED;
     real own[3 * FLUXES], *const kept = KEPT > 0 ? F + FLUXES * FACES + threadIdx.x : own;
     // what leaves the cell, and the fluxes along z at its low and its high side
     real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
-    const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * cx, ry = sides_of_cell * cy, rz = sides_of_cell * cz;
+    const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
-    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, U + u0, P, k, n, m, tx, ty, sy, sz, su);
+    // primitives of the first planes, and fluxes through the low side along z
+    for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, states_now + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
         if (inside) count += flux<2>(numbers, P, tx, ty, -1, rz, low, APART);
@@ -221,12 +226,13 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
             __syncthreads();
-            for (int j = 0; j < m; j++) book(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+            for (int j = 0; j < m; j++) account(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, step_weight * step_z);
         }
         __syncthreads();
     }
     for (int k = 0; k < l; k++) {
-        if constexpr (DIMENSIONS > 2) load_plane(numbers, U + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
+        if constexpr (DIMENSIONS > 2) load_plane(numbers, states_now + u0, P, k + GHOSTS, n, m, tx, ty, sy, sz, su);
+        // fluxes along x, and the first part of the divergence
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
                 count += flux<0>(numbers, P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
@@ -235,13 +241,14 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
 #pragma unroll
             for (int v = 0; v < FLUXES; v++) {
                 const real *f = F + v * FACES + ty * ROW + tx;
-                D[v * APART] = (f[1] - f[0]) * cx;
+                D[v * APART] = (f[1] - f[0]) * step_x;
             }
         }
         for (int j = 0; j < m; j++) {
-            if (sides & 1) book(out, F + j * ROW, 0, step, 1, x_alike, weight * cx);
-            if (sides & 2) book(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, weight * cx);
+            if (sides & 1) account(out, F + j * ROW, 0, step, 1, x_alike, step_weight * step_x);
+            if (sides & 2) account(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, step_weight * step_x);
         }
+        // fluxes along y
         if constexpr (DIMENSIONS > 1) {
             __syncthreads();
             if (tx < n)
@@ -251,19 +258,20 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             if (inside) {
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) {
-                    const real *f = F + place(v, 1) * FACES + ty * ROW + tx;
-                    D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * cy;
+                    const real *f = F + position_of(v, 1) * FACES + ty * ROW + tx;
+                    D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * step_y;
                 }
             }
-            if (sides & 4) book(out + 2 * CONSERVED, F, 1, step, nx, y_alike, weight * cy);
-            if (sides & 8) book(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, weight * cy);
+            if (sides & 4) account(out + 2 * CONSERVED, F, 1, step, nx, y_alike, step_weight * step_y);
+            if (sides & 8) account(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, step_weight * step_y);
         }
+        // fluxes through the high side along z, which are those of the next plane's low side
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
                 count += flux<2>(numbers, P, tx, ty, k, rz, high, APART) && k < l - 1;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++)
-                    D[v * APART] = D[v * APART] + (high[place(v, 2) * APART] - low[place(v, 2) * APART]) * cz;
+                    D[v * APART] = D[v * APART] + (high[position_of(v, 2) * APART] - low[position_of(v, 2) * APART]) * step_z;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) low[v * APART] = high[v * APART];
             }
@@ -272,40 +280,43 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                 if (inside)
                     for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v * APART];
                 __syncthreads();
-                for (int j = 0; j < m; j++) book(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, weight * cz);
+                for (int j = 0; j < m; j++) account(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, step_weight * step_z);
             }
         }
+        // the new state
         if (inside) {
             const long long u = u0 + k * sz + ty * sy + tx;
             real before[VARIABLES], now[VARIABLES];
 #pragma unroll
-            for (int v = 0; v < VARIABLES; v++) before[v] = U_n[u + v * su], now[v] = U[u + v * su];
+            for (int v = 0; v < VARIABLES; v++) before[v] = states_before[u + v * su], now[v] = states_now[u + v * su];
             if constexpr (FRACTIONAL) {
-                const real volume = volumes[u - tile[BLOCK] * (VARIABLES - volumes_1) * su];
-                const real concentration = 1 / maximum(volume, LEAST_VOLUME);
+                const real volume = states_volumes[u - tile[BLOCK] * (VARIABLES - states_volumes_1) * su];
+                const real concentration = 1 / maximum(volume, MINIMUM_VOLUME);
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++) D[v * APART] = D[v * APART] * concentration;
             }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
             const auto divergence = tuple_of<FLUXES>(D, APART);
-            advance(numbers, tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, b, dt, U_new + u, su);
+            advance(numbers, tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, step_b, step_dt, states_after + u, su);
         }
         __syncthreads();
     }
+    // whether the tile has stayed as it is; a uniform one gets its state everywhere
     bool unchanged = uniform;
     for (int v = 0; v < VARIABLES && uniform; v++) {
-        const real value = U_new[u0 + v * su];
-        unchanged = unchanged && U[u0 + v * su] == value && U_n[u0 + v * su] == value;
+        const real value = states_after[u0 + v * su];
+        unchanged = unchanged && states_now[u0 + v * su] == value && states_before[u0 + v * su] == value;
         for (int k = 0; k < nz && !is_calm; k++)
             for (int j = ty; j < ny; j += TILE_Y)
-                for (int i = tx; i < nx; i += TILE_X) U_new[u0 + v * su + k * sz + j * sy + i] = value;
+                for (int i = tx; i < nx; i += TILE_X) states_after[u0 + v * su + k * sz + j * sy + i] = value;
     }
+    // how many faces were limited
     long long *counts = (long long *)shared;
     counts[threadIdx.x] = count;
     __syncthreads();
     if (threadIdx.x > 0) return;
-    for (int thread = 0; thread < THREADS; thread++) limited[t] += counts[thread];
-    stages[t] = unchanged ? stages[t] + 1 : 0;
+    for (int thread = 0; thread < THREADS; thread++) tiles_limited[t] += counts[thread];
+    tiles_stages[t] = unchanged ? tiles_stages[t] + 1 : 0;
 }
 
 #else
@@ -330,7 +341,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(
         const auto W = primitives(numbers, tuple_of<VARIABLES>(state));
         const real c = sound_speed(numbers, W);
         real w[VARIABLES];
-        put(W, w, 1);
+        set(W, w, 1);
         real signal = (magnitude(w[PHASES]) + c) * rates[0];
         for (int d = 1; d < DIMENSIONS; d++) signal = signal + (magnitude(w[PHASES + d]) + c) * rates[d];
         real lightest = state[0];

@@ -31,3 +31,13 @@ class Jwl(FluidEos):
         slope_a = a * (self.R1 * v * v - self.omega * v - self.omega / self.R1)
         slope_b = b * (self.R2 * v * v - self.omega * v - self.omega / self.R2)
         return (pressure, (slope_a + slope_b) * (1.0 / self.rho0))
+
+    def grueneisen(self, rho):
+        """Grueneisen coefficient and its slope with density."""
+        return (self.omega, 0.0)
+
+    def cold_curve(self, rho):
+        """Pressure [Pa] and energy [J/kg] of the coldest state."""
+        v = self.rho0 / rho
+        a, b = self.A * exp(-self.R1 * v), self.B * exp(-self.R2 * v)
+        return (a + b, a / (self.rho0 * self.R1) + b / (self.rho0 * self.R2))

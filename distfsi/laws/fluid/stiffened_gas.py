@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-from distfsi.formulas.symbols import Symbol
+from distfsi.formulas.symbols import REST_DENSITY
 from distfsi.laws.law import FluidEos, number, quantity
-
-REST_DENSITY = Symbol("density at which the shifted energy vanishes with the pressure [kg/m3]")
 
 
 @dataclass(frozen=True)
 class StiffenedGas(FluidEos):
     """p = (gamma - 1) rho e - gamma p_inf."""
+
+    closed_form = True
 
     gamma: float = number("exponent", above=1.0)
     p_inf: float = quantity("Pa", "stiffening pressure", at_least=0.0)
@@ -18,6 +18,14 @@ class StiffenedGas(FluidEos):
     def reference(self, rho):
         """Reference pressure [Pa] and its slope with density [m2/s2]."""
         return (-self.gamma * self.p_inf, 0.0)
+
+    def grueneisen(self, rho):
+        """Grueneisen coefficient and its slope with density."""
+        return (self.gamma - 1.0, 0.0)
+
+    def cold_curve(self, rho):
+        """Pressure [Pa] and energy [J/kg] of the coldest state."""
+        return (-self.p_inf, self.p_inf / rho)
 
     def shifted_reference(self, rho):
         """The reference to energies counted from that at REST_DENSITY without pressure, a constant per mass.

@@ -1,35 +1,21 @@
 """Loops over particles for those who bring them to ranks: their blocks, who is near what, mirror images."""
 
-from math import floor
-
-from distfsi.device.markers import driver, helper
+from distfsi.device.markers import driver
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS
+from distfsi.mesh.kernels.grid import BlockGrid, BlockTable, block_at, block_coordinate
 from distfsi.mesh.kernels.rows import count_marked, extend, list_marked, pack_rows, take_rows
 
 IMAGES = 8  # an id and its images: a key is 8 id + the axes that an image is mirrored along (bit a: axis a)
 
 
-@helper
-def coordinate_of(x, axis, lower, spacing, grid_cells, block_cells):
-    """Coordinate of the block that x [m] is in or, outside, nearest to, as mesh/blocks.py finds it."""
-    place = (x - lower[axis]) / spacing[axis]
-    last = 1.0 * (grid_cells[axis] - 1)
-    return int(floor(max(min(place, last), 0.0))) // block_cells[axis]
-
-
 @driver
-def find_moved(begin, end, chunk, position, block, lower, spacing, grid_cells, block_cells, curve_index, moved):
-    """block[i] = curve index of a particle's block; moved[c] = how many of chunk c were in another one."""
+def find_moved(begin, end, chunk, position, block, grid: BlockGrid, table: BlockTable, moved):
+    """block[i] = number of a particle's block; moved[c] = how many of chunk c were in another one."""
     for c in range(begin, end):
         found = 0
         for i in range(c * chunk, min((c + 1) * chunk, len(block))):
-            bx, by, bz = coordinate_of(position[i, 0], 0, lower, spacing, grid_cells, block_cells), 0, 0
-            if DIMENSIONS > 1:
-                by = coordinate_of(position[i, 1], 1, lower, spacing, grid_cells, block_cells)
-            if DIMENSIONS > 2:
-                bz = coordinate_of(position[i, 2], 2, lower, spacing, grid_cells, block_cells)
-            now = curve_index[bx, by, bz]
+            now = block_at(position, i, grid, table)
             if block[i] != now:
                 found += 1
             block[i] = now
@@ -38,32 +24,27 @@ def find_moved(begin, end, chunk, position, block, lower, spacing, grid_cells, b
 
 @driver
 def find_border(
-    begin, end, position, reach, image_reach, axes, places, lower, spacing, grid_cells, block_cells, curve_index,
-    owners, rank, mark,
-):  # fmt: skip
+    begin, end, position, reach, image_reach, axes, planes, grid: BlockGrid, table: BlockTable, owners, rank, mark
+):
     """mark[i] = 1 for particles within `reach` of another rank's blocks or `image_reach` of a plane, else 0.
 
-    axes, places (planes,): the planes that mirror.
+    axes, planes (n,): the planes that mirror, across an axis where it is `planes` [m]; owners (all blocks,): of blocks.
     """
     for i in range(begin, end):
         near = 0
+        # planes
         for n in range(len(axes)):
-            if abs(position[i, axes[n]] - places[n]) <= image_reach:
+            if abs(position[i, axes[n]] - planes[n]) <= image_reach:
                 near = 1
-        low = tuple(
-            coordinate_of(position[i, d] - reach, d, lower, spacing, grid_cells, block_cells)
-            for d in static_range(DIMENSIONS)
-        )
-        high = tuple(
-            coordinate_of(position[i, d] + reach, d, lower, spacing, grid_cells, block_cells)
-            for d in static_range(DIMENSIONS)
-        )
+        # blocks of other ranks
+        low = tuple(block_coordinate(position[i, d] - reach, d, grid, table) for d in static_range(DIMENSIONS))
+        high = tuple(block_coordinate(position[i, d] + reach, d, grid, table) for d in static_range(DIMENSIONS))
         y_first, y_last = (low[1], high[1]) if DIMENSIONS > 1 else (0, 0)
         z_first, z_last = (low[2], high[2]) if DIMENSIONS > 2 else (0, 0)
         for x in range(low[0], high[0] + 1):
             for y in range(y_first, y_last + 1):
                 for z in range(z_first, z_last + 1):
-                    if owners[curve_index[x, y, z]] != rank:
+                    if owners[table.curve_index[x, y, z]] != rank:
                         near = 1
         mark[i] = near
 
@@ -84,7 +65,7 @@ def mirror_values(begin, end, first, width, source, mask, parity, values):
 
 @driver
 def mirror_positions(begin, end, first, width, source, mask, plane, values):
-    """As mirror_values(), of positions: `plane` (images, width) holds the places of the mirrors."""
+    """As mirror_values(), of positions: `plane` (images, width) holds the positions of the mirrors."""
     for m in range(begin, end):
         for k in range(width):
             value = values[source[m] * width + k]
@@ -94,5 +75,13 @@ def mirror_positions(begin, end, first, width, source, mask, plane, values):
 
 # What mesh/particles.py needs of these and of mesh/kernels/rows.py.
 EXCHANGE = (
-    find_moved, find_border, mirror_values, mirror_positions, count_marked, list_marked, take_rows, pack_rows, extend,
-)  # fmt: skip
+    find_moved,
+    find_border,
+    mirror_values,
+    mirror_positions,
+    count_marked,
+    list_marked,
+    take_rows,
+    pack_rows,
+    extend,
+)

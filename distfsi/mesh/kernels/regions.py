@@ -3,7 +3,8 @@
 A cell of a list is named by its flat index in a field of one variable; `cells` are those of a block in memory.
 """
 
-from distfsi.device.markers import ByHand, driver, helper
+from distfsi.device.markers import ByHand, driver
+from distfsi.mesh.kernels.grid import first_value
 
 
 def region_block(constants, arguments):
@@ -17,7 +18,7 @@ def copy_regions(first, last, table, destination, source, mirror):
     """Copy the regions of rows `first` to `last` (excluded) of `table` from flat array `source` to `destination`.
 
     table   (regions, 14) int64: cells along x, y, z; flips (bit a: mirrored along axis a); then for the destination and
-            for the source the place of the first value and the steps from variable to variable and along x, y, z
+            for the source the index of the first value and the steps from variable to variable and along x, y, z
             (a destination's step along x is always 1)
     mirror  (variables,) int64: axis whose reflection changes the variable's sign, -1 for none
     """
@@ -38,12 +39,6 @@ def copy_regions(first, last, table, destination, source, mirror):
                     else:
                         for x in range(nx):
                             destination[d + x] = source[s + s_x * x]
-
-
-@helper
-def first_value(at, variables, cells):
-    """Place of a cell's first value in a flat field of so many variables."""
-    return at + at // cells * (variables - 1) * cells
 
 
 @driver

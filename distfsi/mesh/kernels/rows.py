@@ -13,28 +13,28 @@ from distfsi.device.markers import driver
 def find_largest(begin, end, chunk, values, largest):
     """largest[c] = largest of the values in chunk c; NaN if there is one."""
     for c in range(begin, end):
-        most = values[c * chunk]
+        greatest = values[c * chunk]
         for i in range(c * chunk + 1, min((c + 1) * chunk, len(values))):
-            most = most if most >= values[i] or most != most else values[i]
-        largest[c] = most
+            greatest = greatest if greatest >= values[i] or greatest != greatest else values[i]
+        largest[c] = greatest
 
 
 @driver
-def find_least(begin, end, chunk, values, least, place):
-    """least[c] = first of the least values in chunk c, or of its NaN; place[c] = where it is."""
+def find_minimum(begin, end, chunk, values, lowest, index):
+    """lowest[c] = first of the smallest values in chunk c, or of its NaN; index[c] = where it is."""
     for c in range(begin, end):
         first = c * chunk
-        few = values[first]
+        smallest = values[first]
         for i in range(first + 1, min(first + chunk, len(values))):
-            if values[i] < few or (values[i] != values[i] and few == few):
-                few, first = values[i], i
-        least[c] = few
-        place[c] = first
+            if values[i] < smallest or (values[i] != values[i] and smallest == smallest):
+                smallest, first = values[i], i
+        lowest[c] = smallest
+        index[c] = first
 
 
 @driver
 def find_bounds(begin, end, chunk, values, width, bounds):
-    """bounds[c] = least, then largest value of each column of the rows in chunk c; a NaN does not count."""
+    """bounds[c] = smallest, then largest value of each column of the rows in chunk c; a NaN does not count."""
     rows = len(values) // width
     for c in range(begin, end):
         for k in range(width):
@@ -112,4 +112,4 @@ def extend(begin, end, own, width, source, stride, column, packed, extended):
             extended[i * width + k] = value
 
 
-REDUCTIONS = (find_largest, find_least, find_bounds, add_rows)
+REDUCTIONS = (find_largest, find_minimum, find_bounds, add_rows)

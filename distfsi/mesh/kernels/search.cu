@@ -1,4 +1,4 @@
-// fill_cells of solid/kernels/pairs.py for a GPU: one block of threads counts the particles of each cell, adds up, and fills.
+// fill_cells of mesh/kernels/search.py for a GPU: one block of threads counts the particles of each cell, adds up, and fills.
 // The particles of a cell come in any order here; order_cells sorts them.
 
 extern "C" __global__ void __launch_bounds__(THREADS, 1) fill_cells_kernel(PARAMETERS)

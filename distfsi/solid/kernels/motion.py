@@ -2,7 +2,7 @@
 
 from distfsi.device.markers import driver
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, GRAVITY
+from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS
 from distfsi.solid.kernels.records import DENSITY, MASS, SMOOTHING, SOUND_SPEED, VELOCITY
 
 WORK, IMPULSE = 0, 1  # columns of the budget of kick()
@@ -30,7 +30,7 @@ def kick(begin, end, dt, mass, fixed, acceleration, velocity, budget):
         work = 0.0
         for d in static_range(DIMENSIONS):
             # All forces; what holds a fixed particle takes them.
-            weight = mass[i] * GRAVITY[d] * dt
+            weight = mass[i] * BODY_FORCE[d] * dt
             given = mass[i] * acceleration[i, d] * dt + weight
             held = -given if fixed[i] else 0.0
             before = velocity[i, d]

@@ -1,77 +1,83 @@
-"""Loops that list the band, the covered cells, and the loose ones: whole cells that the wall has left, in which the
-volume that their fluid has swept is not quite theirs.
+"""Loops that list the band, the covered cells, and the uneven ones: whole cells that the wall has left, whose fluid
+does not quite fill them.
 
 The band are all cells that are not whole or next to one that is not, and those whose neighbours' slopes a cell without
 a fluid stops: two cells away, as the faces of whole cells are open. So the stage has the same fluxes around all others.
 
-An item is a row of cells along x. Rows are numbered as they lie in memory, ghosts included; cells are named as in
-coupling/kernels/cells.py.
+An item is a row of cells along x, ghosts included.
 """
 
-from distfsi.coupling.cut_cells.kernels.geometry import step_to
-from distfsi.coupling.kernels.cells import COVERED, FLUID, cells_of_row
+from distfsi.coupling.cut_cells.kernels.records import Walls
+from distfsi.coupling.kernels.cells import COVERED, FLUID
 from distfsi.device.markers import driver, load, row, store
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS
+from distfsi.mesh.kernels.grid import BlockGrid, block_of_row, block_size, cells_of_row, ghosts, step_to
 
 # What a cell is to the coupling; the ghosts of all but the first must be known to it.
-FAR, BAND, BEHIND, LOOSE = range(4)
+FAR, BAND, BEHIND, UNEVEN = range(4)
 
 OPEN, WHOLE = 1, 2
 
-NEAR_WHOLE = 0.25  # of a cell: the fluid's stage advances open cells whose swept volume is not farther off
+NEAR_WHOLE = 0.25  # of a cell: the fluid's stage advances open cells whose fluid volume fraction is not farther off
+SLOPE_REACH = 2  # cells: how far a cell without a fluid changes slopes
+
+# Columns of the numbers of cells that find_band() counts.
+BAND_CELLS, COVERED_CELLS, UNEVEN_CELLS = range(3)
 
 
 @row
-def whole_row(whole, kind, fraction_old, fraction_new, swept, at, share, n):
+def whole_row(whole, walls: Walls, volume, at, first, n):
     """whole[at …] = WHOLE where a cell is like any other of the fluid, throughout the step; OPEN where it holds fluid
-    that flows, else 0."""
+    that flows, else 0. first: of their volumes."""
     for i in range(n):
-        old, new, volume = load(fraction_old, at + i), load(fraction_new, at + i), load(swept, share + i)
-        fluid, near = load(kind, at + i) == FLUID, abs(volume - 1.0) <= NEAR_WHOLE
+        old, new, held = load(walls.old_fraction, at + i), load(walls.new_fraction, at + i), load(volume, first + i)
+        fluid, near = load(walls.kind, at + i) == FLUID, abs(held - 1.0) <= NEAR_WHOLE
         part = WHOLE if (old == 1.0) & (new == 1.0) & near else OPEN
         store(whole, at + i, part if fluid else 0)
 
 
 @row
-def join_row(plain, whole, at, step, least, n):
-    """plain[at …] becomes 0 where the cell `step` away is less than `least`."""
+def compare_row(plain, whole, at, step, minimum, n):
+    """plain[at …] becomes 0 where the cell a `step` away is less than the `minimum`."""
     for i in range(n):
-        store(plain, at + i, load(plain, at + i) if load(whole, at + step + i) >= least else 0)
+        store(plain, at + i, load(plain, at + i) if load(whole, at + step + i) >= minimum else 0)
 
 
 @driver
-def find_whole(begin, end, near, whole, kind, fraction_old, fraction_new, swept, fields, shape):
-    """whole = what each cell of `near` blocks is to its neighbours' stage. swept (blocks, fields, Z, Y, X)."""
-    cells = shape[0] * shape[1] * shape[2]
+def find_whole(begin, end, near, whole, walls: Walls, volume, grid: BlockGrid):
+    """whole = what each cell of `near` blocks is to its neighbours' stage. volume (blocks, fields, Z, Y, X)."""
+    cells = block_size(grid)
     for r in range(begin, end):
-        b = r // (shape[0] * shape[1])
+        b = block_of_row(r, grid)
         if near[b] > 0:
-            at = r * shape[2]
-            whole_row(whole, kind, fraction_old, fraction_new, swept, at, at + b * (fields - 1) * cells, shape[2])
+            at = r * grid.shape[2]
+            whole_row(whole, walls, volume, at, at + b * (volume.shape[1] - 1) * cells, grid.shape[2])
 
 
 @driver
-def find_band(begin, end, near, plain, mark, whole, kind, swept, fields, offsets, steps, shape, extent, counts):
-    """mark = what each cell of `near` blocks is; counts (rows, 3) = cells in the band, covered and loose ones.
+def find_band(begin, end, near, plain, mark, whole, kind, volume, offsets, counts, grid: BlockGrid):
+    """mark = what each cell of `near` blocks is; counts (rows, 3) = cells in the band, covered and uneven ones.
 
     plain becomes WHOLE where the fluid's stage has the fluxes of a cell right, else 0.
     """
-    cells = shape[0] * shape[1] * shape[2]
+    cells = block_size(grid)
     for r in range(begin, end):
-        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
-        n = cells_of_row(r, b, shape, extent) if near[b] > 0 else 0
+        b, at = block_of_row(r, grid), r * grid.shape[2] + ghosts()[0]
+        n = cells_of_row(r, b, grid) if near[b] > 0 else 0
+        # plain cells: whole among whole neighbours, and no slope of theirs is stopped
         if n > 0:
             for i in range(n):
                 store(plain, at + i, load(whole, at + i))
-            join_row(plain, whole, at, 0, WHOLE, n)
+            compare_row(plain, whole, at, 0, WHOLE, n)
             for m in range(len(offsets)):
-                join_row(plain, whole, at, step_to(offsets, m, steps), WHOLE, n)
+                compare_row(plain, whole, at, step_to(offsets, m, grid), WHOLE, n)
             for d in static_range(DIMENSIONS):
-                join_row(plain, whole, at, -2 * steps[d], OPEN, n)
-                join_row(plain, whole, at, 2 * steps[d], OPEN, n)
-        share = at + b * (fields - 1) * cells
-        band, covered, loose = 0, 0, 0
+                compare_row(plain, whole, at, -SLOPE_REACH * grid.steps[d], OPEN, n)
+                compare_row(plain, whole, at, SLOPE_REACH * grid.steps[d], OPEN, n)
+        # all others are of the band, or covered
+        first = at + b * (volume.shape[1] - 1) * cells
+        band, covered, uneven = 0, 0, 0
         for i in range(n):
             if kind[at + i] == COVERED:
                 mark[at + i] = BEHIND
@@ -79,31 +85,31 @@ def find_band(begin, end, near, plain, mark, whole, kind, swept, fields, offsets
             elif plain[at + i] == 0:
                 mark[at + i] = BAND
                 band += 1
-            elif load(swept, share + i) != 1.0:
-                mark[at + i] = LOOSE
-                loose += 1
+            elif load(volume, first + i) != 1.0:
+                mark[at + i] = UNEVEN
+                uneven += 1
             else:
                 mark[at + i] = FAR
-        counts[r, 0] = band
-        counts[r, 1] = covered
-        counts[r, 2] = loose
+        counts[r, BAND_CELLS] = band
+        counts[r, COVERED_CELLS] = covered
+        counts[r, UNEVEN_CELLS] = uneven
 
 
 @driver
-def list_band(begin, end, near, mark, shape, extent, first, band, covered, loose):
-    """Write the cells of the band, the covered and the loose ones, row by row, from the places first (rows, 3) on."""
+def list_band(begin, end, near, mark, first, band, covered, uneven, grid: BlockGrid):
+    """Write the cells of the band, the covered and the uneven ones, row by row, from the places first (rows, 3) on."""
     for r in range(begin, end):
-        b, at = r // (shape[0] * shape[1]), r * shape[2] + 2
-        n, m, l = first[r, 0], first[r, 1], first[r, 2]
-        for i in range(cells_of_row(r, b, shape, extent) if near[b] > 0 else 0):
+        b, at = block_of_row(r, grid), r * grid.shape[2] + ghosts()[0]
+        n, m, l = first[r, BAND_CELLS], first[r, COVERED_CELLS], first[r, UNEVEN_CELLS]
+        for i in range(cells_of_row(r, b, grid) if near[b] > 0 else 0):
             if mark[at + i] == BEHIND:
                 covered[m] = at + i
                 m += 1
             elif mark[at + i] == BAND:
                 band[n] = at + i
                 n += 1
-            elif mark[at + i] == LOOSE:
-                loose[l] = at + i
+            elif mark[at + i] == UNEVEN:
+                uneven[l] = at + i
                 l += 1
 
 

@@ -1,13 +1,27 @@
 """Loops that tell which mirror images of particles count: those whose body reaches the end of the domain."""
 
 from math import sqrt
+from typing import NamedTuple
 
-from distfsi.coupling.kernels.interpolation import bins_around
+from distfsi.coupling.cut_cells.kernels.particles import Domain
+from distfsi.coupling.kernels.interpolation import Cloud
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.geometry import side_of_cube
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS
 from distfsi.mesh.kernels.particles import IMAGES
+from distfsi.mesh.kernels.search import bins_around, particles_of_row
+
+
+class ImageRange(NamedTuple):
+    """Which images count: all of one whose body is no farther from an end of the domain than `touching` [m], nothing of
+    one that is `apart` [m] or more. Points belong to the body of a particle if they stand no more than `aside` [m]
+    beside it, farther by as much as they do stand so. Particles `farthest` [m] from the end have no images."""
+
+    touching: float
+    apart: float
+    aside: float
+    farthest: float
 
 
 @helper
@@ -17,39 +31,35 @@ def way_along(dx, axis):
 
 
 @driver
-def weigh_images(
-    begin, end, weight, place, size, lowest, highest, touching, apart, aside, farthest, key, volume, position, start,
-    order, lower, search, low, window, strides,
-):  # fmt: skip
-    """weight (n, D) = how much the image of a particle at a `place` (n, D) in the nearer end of each axis counts.
+def weigh_images(begin, end, weight, position, size, domain: Domain, ranges: ImageRange, key, points: Cloud):
+    """weight (n, D) = how much the image of a particle at a `position` (n, D) in the nearer end of each axis counts.
 
-    All if its body is no farther from that end than `touching` [m], nothing if it is `apart` [m] or more. The body is
-    as near as the nearest of the cubes of the points at `position`, of `volume` (…, 2) [in the domain, in all], that
-    stand no more than `aside` [m] beside the particle, farther by as much as they do stand so; `size` (n, 1): volume of
-    its own cube. Particles `farthest` [m] from the end have no images.
+    The body is as near as the nearest of the cubes of the `points`, whose values are volumes [in the domain, in all];
+    size (n, 1): volume of the particle's own cube; key: of the points.
     """
-    reach = aside + apart
+    reach = ranges.aside + ranges.apart
     for i in range(begin, end):
         for axis in static_range(DIMENSIONS):
-            at_low = place[i, axis] - lowest[axis] < highest[axis] - place[i, axis]
-            plane, sign = (lowest[axis] if at_low else highest[axis]), (1.0 if at_low else -1.0)
-            depth = sign * (place[i, axis] - plane)
-            gap = max(depth - 0.5 * side_of_cube(size[i, 0]), 0.0) if depth < farthest else apart
-            if gap > touching and depth < farthest:
-                foot = tuple(plane if d == axis else place[i, d] for d in static_range(DIMENSIONS))
-                bx, by, bz = bins_around(
-                    foot, tuple(reach for _ in static_range(DIMENSIONS)), lower, search, low, window
-                )
+            # how far the particle's own cube is from the nearer end
+            at_low = position[i, axis] - domain.lower[axis] < domain.upper[axis] - position[i, axis]
+            plane, sign = (domain.lower[axis] if at_low else domain.upper[axis]), (1.0 if at_low else -1.0)
+            depth = sign * (position[i, axis] - plane)
+            own = max(depth - 0.5 * side_of_cube(size[i, 0]), 0.0)
+            gap = own if depth < ranges.farthest else ranges.apart
+            # how far the cubes of points beside it are
+            if gap > ranges.touching and depth < ranges.farthest:
+                foot = tuple(plane if d == axis else position[i, d] for d in static_range(DIMENSIONS))
+                bx, by, bz = bins_around(foot, tuple(reach for _ in static_range(DIMENSIONS)), points.bins)
                 for k in range(bz[0], bz[1]):
                     for j in range(by[0], by[1]):
-                        row = k * strides[2] + j * strides[1]
-                        for n in range(start[row + bx[0]], start[row + bx[1]]):
-                            q = order[n]
-                            if key[q] % IMAGES == 0 and volume[q, 1] > 0.0:
-                                dx = tuple(position[q, d] - foot[d] for d in static_range(DIMENSIONS))
-                                above = max(sign * dx[axis] - 0.5 * side_of_cube(volume[q, 1]), 0.0)
-                                gap = min(gap, above + max(way_along(dx, axis) - aside, 0.0))
-            weight[i, axis] = min(max((apart - gap) / (apart - touching), 0.0), 1.0)
+                        start, stop = particles_of_row(bx, j, k, points.bins)
+                        for n in range(start, stop):
+                            q = points.bins.order[n]
+                            if key[q] % IMAGES == 0 and points.values[q, 1] > 0.0:
+                                dx = tuple(points.position[q, d] - foot[d] for d in static_range(DIMENSIONS))
+                                above = max(sign * dx[axis] - 0.5 * side_of_cube(points.values[q, 1]), 0.0)
+                                gap = min(gap, above + max(way_along(dx, axis) - ranges.aside, 0.0))
+            weight[i, axis] = min(max((ranges.apart - gap) / (ranges.apart - ranges.touching), 0.0), 1.0)
 
 
 @helper

@@ -17,6 +17,8 @@ class Compaction(SolidEos):
     pressure. From the largest compression so far, `peak_compression`, the material unloads along a line.
     """
 
+    partner = "concrete"
+
     crush_pressure: float = quantity("Pa", "pressure at which pores begin to close", above=0.0)
     crush_strain: float = number("rho/rho0 - 1 there", above=0.0)
     lock_pressure: float = quantity("Pa", "pressure at which all pores are closed", above=0.0)
@@ -27,7 +29,6 @@ class Compaction(SolidEos):
     full_strain: float = field(init=False)
 
     columns = (Column("peak_compression", "1", "largest rho/rho0 - 1 so far"),)
-    needs = "concrete"
 
     def __post_init__(self) -> None:
         """Find `full_strain` by Newton's method."""

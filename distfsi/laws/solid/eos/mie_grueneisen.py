@@ -26,6 +26,10 @@ class MieGrueneisen(SolidEos):
     def reference_sound_speed(self, density):
         return self.c0
 
+    def behind_shock(self, u: float) -> tuple[float, float]:
+        """By how much sound is faster behind a shock U = c0 + s1 u, and the volume there over that in front of it."""
+        return (2.0 * self.s1 - 1.0) * u, 1.0 - u / (self.c0 + self.s1 * u)
+
     def respond(self, density, energy, rest: Rest, memory: EosMemory):
         mu = density / rest.density - 1.0
         pressure = self.pressure(mu, energy, rest)

@@ -18,6 +18,8 @@ class Concrete(Strength):
     Without a failure model no tension beyond (1 - D) tensile_strength is carried; with one, cracks limit it instead.
     """
 
+    partner = "compaction"
+
     shear_modulus: float = quantity("Pa", "shear modulus G", above=0.0)
     compressive_strength: float = quantity("Pa", "uniaxial compressive strength f_c", above=0.0)
     tensile_strength: float = quantity("Pa", "largest tension T; a `failure` takes its place", above=0.0)
@@ -32,7 +34,6 @@ class Concrete(Strength):
     reference_rate: float = quantity("1/s", "strain rate at which the rate factor is one", above=0.0, default=1.0)
 
     columns = (PLASTIC_STRAIN, Column("accumulated_damage", "1", "plastic and compacted strain over those at failure"))
-    needs = "compaction"
 
     def respond(self, trial: Trial, dt, memory: StrengthMemory):
         crushed = memory.accumulated_damage

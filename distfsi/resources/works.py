@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.laws.law import FluidEos
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
 from distfsi.laws.solid.scatter import Scatter
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
+from distfsi.narrowing import present
 from distfsi.scene import description as scene
 from distfsi.scene.build import BLOCK_CELLS, TILE_CELLS
 
+Precision = Literal["float64", "float32"]
 AIR, HELIUM, WATER = IdealGas(1.4), IdealGas(1.67), StiffenedGas(4.4, 6e8)
 TNT = Jwl(1630.0, 3.712e11, 3.21e9, 4.15, 0.95, 0.3)
 COPPER = MieGrueneisen(3940.0, 1.489, 0.0, 0.0, 1.99, 0.0)
@@ -28,7 +32,11 @@ BURNT_TNT, AMBIENT_AIR = (1630.0, 8.376e9), (1.225, 101325.0)  # density, pressu
 
 
 def gases(
-    cells: tuple[int, ...], eos: tuple, inner: tuple[float, float], outer: tuple[float, float], precision="float64"
+    cells: tuple[int, ...],
+    eos: tuple[FluidEos, ...],
+    inner: tuple[float, float],
+    outer: tuple[float, float],
+    precision: Precision = "float64",
 ) -> scene.Scene:
     """A ball of one material (density, pressure) in another, in a closed box; the standard fluid work."""
     D = len(cells)
@@ -70,7 +78,7 @@ def blast_on_plates(cells: int, dimensions: int, side: float, count: int, pitch:
         for n in range(count)
         for body in _cube((low + n * pitch, *across), (2.0,) + (side,) * (dimensions - 1)).bodies
     ]
-    return replace(one, solid=replace(one.solid, bodies=tuple(plates)))
+    return replace(one, solid=replace(present(one.solid), bodies=tuple(plates)))
 
 
 def bursting_ball() -> scene.Scene:
@@ -79,8 +87,8 @@ def bursting_ball() -> scene.Scene:
     eos, strength = LinearEos(3.25e9), PerfectlyPlastic(0.7e9, 2e7)
     rest, shape = (0.0,) * 3, scene.Ball((0.0,) * 3, 0.4)
     ball = scene.Body("ball", shape, 0.1, 2000.0, rest, eos, strength, None, failure, radial_velocity=300.0)
-    sides = (("outflow", "outflow"),) * 2 + (("symmetry", "outflow"),)
-    domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, sides)
+    free: tuple[scene.BoundaryKind, scene.BoundaryKind] = ("outflow", "outflow")
+    domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, (free, free, ("symmetry", "outflow")))
     return _endless(domain, None, scene.Solid((ball,), SMOOTHING, 1.0, 2.0))
 
 
@@ -99,7 +107,7 @@ def _endless(domain: scene.Domain, fluid: scene.Fluid | None, solid: scene.Solid
     D = domain.dimensions
     performance = scene.Performance(BLOCK_CELLS[D - 1], TILE_CELLS[D - 1])
     time, output = scene.Time(np.inf, 0.5, None), scene.Output("", 0.0, 1)
-    return scene.Scene("bench", domain, time, (0.0,) * D, fluid, solid, output, performance)
+    return scene.Scene("bench", domain, time, fluid, solid, output, performance)
 
 
 TWO_GASES = (HELIUM, AIR), (0.138, 1.0), (1.0, 2.0)

@@ -9,37 +9,59 @@ from __future__ import annotations
 
 import json
 import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from distfsi.commands.bench import Stopwatch, start, stir
-from distfsi.commands.works import FLUIDS
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
+from distfsi.resources.bench import start, stir
+from distfsi.resources.works import FLUIDS
 from distfsi.scene.description import Scene
+from distfsi.simulation import Simulation
 
 WORK = "shock_bubble_2d"
 STEPS, REPEATS = 5, 5
 
 
-def time_steps(simulation) -> dict[str, float]:
+@dataclass
+class Stopwatch:
+    """Calls a function and adds up the time it takes [s]."""
+
+    function: Callable[..., Any]
+    seconds: float = 0.0
+
+    def __call__(self, *arguments: Any) -> Any:
+        started = clock.perf_counter()
+        result = self.function(*arguments)
+        self.seconds += clock.perf_counter() - started
+        return result
+
+
+def time_steps(simulation: Simulation) -> dict[str, float]:
     """Seconds per step of this rank: the whole, packing, exposed, computing; of the fastest run of several."""
-    fluid, best = simulation.fluid, {"step": np.inf}
-    exchange = fluid.exchange
-    plain = exchange.start, exchange.finish, fluid.advance_tiles
+    fluid, best = present(simulation.fluid), {"step": np.inf}
+    watched = (fluid.exchange, "start"), (fluid.exchange, "finish"), (fluid, "advance_tiles")
+    plain = [getattr(part, name) for part, name in watched]
     for _ in range(REPEATS):
         packing, exposed, computing = watches = [Stopwatch(function) for function in plain]
-        exchange.start, exchange.finish, fluid.advance_tiles = watches
+        for (part, name), watch in zip(watched, watches, strict=True):
+            setattr(part, name, watch)
         simulation.communicator.barrier()
         started = clock.perf_counter()
         for _ in range(STEPS):
             simulation.step()
         simulation.communicator.barrier()
         seconds = (clock.perf_counter() - started) / STEPS
-        if simulation.communicator.maximum([seconds])[0] < simulation.communicator.maximum([best["step"]])[0]:
+        slowest, before = simulation.communicator.maximum(np.array([seconds, best["step"]]))
+        if slowest < before:
             parts = {"packing": packing, "exposed": exposed, "computing": computing}
             best = {"step": seconds} | {name: watch.seconds / STEPS for name, watch in parts.items()}
-    exchange.start, exchange.finish, fluid.advance_tiles = plain
+    for part, name in watched:
+        delattr(part, name)
     return best
 
 
@@ -61,7 +83,7 @@ def time_arrival(fluid: Fluid, communicator: Communicator) -> float:
 def measure(work: Scene, communicator: Communicator, threads: int | None) -> dict[str, float]:
     """Collective. Bytes, times and imbalance of a step of the work on these ranks."""
     simulation = start(work, communicator, threads)
-    fluid = simulation.fluid
+    fluid = present(simulation.fluid)
     stir(fluid)
     simulation.step()
     seconds = time_steps(simulation)
@@ -90,7 +112,7 @@ def measure(work: Scene, communicator: Communicator, threads: int | None) -> dic
     }
 
 
-def main(communicator: Communicator, threads: int | None) -> dict:
+def main(communicator: Communicator, threads: int | None) -> dict[str, Any]:
     """Measure on the ranks this was started on; rank 0 prints JSON."""
     result = {"ranks": communicator.size, WORK: measure(FLUIDS[WORK](), communicator, threads)}
     if communicator.rank == 0:

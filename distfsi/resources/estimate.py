@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from scipy import ndimage, optimize
 
-from distfsi.commands.works import SMOOTHING
 from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.blocks import Blocks
+from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
+from distfsi.resources.works import SMOOTHING
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_steps
@@ -63,7 +67,8 @@ class Resources:
     @cached_property
     def blocks(self) -> list[Blocks]:
         """The blocks of each rank."""
-        return [deal_blocks(self.scene, OneOfMany(rank, self.ranks)) for rank in range(self.ranks)]
+        ranks = (cast(Communicator, OneOfMany(rank, self.ranks)) for rank in range(self.ranks))  # all that is asked
+        return [deal_blocks(self.scene, rank) for rank in ranks]
 
     @property
     def cells(self) -> int:
@@ -91,10 +96,10 @@ class Resources:
             return 0
         D, domain = self.dimensions, self.scene.domain
         spacing = (np.array(domain.upper) - domain.lower)[:D] / domain.cells[:D]
-        place = np.floor((np.concatenate(list(self.positions.values())) - domain.lower[:D]) / spacing).astype(int)
-        first = place.min(axis=0) - 2
-        occupied = np.zeros(place.max(axis=0) - first + 3, dtype=bool)
-        occupied[tuple((place - first).T)] = True
+        cell = np.floor((np.concatenate(list(self.positions.values())) - domain.lower[:D]) / spacing).astype(int)
+        first = cell.min(axis=0) - 2
+        occupied = np.zeros(cell.max(axis=0) - first + 3, dtype=bool)
+        occupied[tuple((cell - first).T)] = True
         around = np.ones((3,) * D, dtype=bool)
         band = ndimage.binary_dilation(occupied, around, 2) & ~ndimage.binary_erosion(occupied, around)
         inside = tuple(slice(max(-low, 0), n - low) for low, n in zip(first, domain.cells, strict=False))
@@ -133,14 +138,14 @@ class Resources:
         D, paper = self.dimensions, 1 + FLOAT * self.dimensions
         if self.scene.coupling.scheme == "paper":
             return paper
-        swept = 3 if len(self.scene.fluid.phases) == 2 else 1
+        swept = 3 if len(present(self.scene.fluid).phases) == 2 else 1
         return paper + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
 
     # ---- files -------------------------------------------------------------------------------------------------------
 
     def cell_file_bytes(self) -> int:
         """Bytes per cell of a field file: density, pressure, velocity and what else the scene has or asks for."""
-        scalars = 2 + (len(self.scene.fluid.phases) == 2)
+        scalars = 2 + (len(present(self.scene.fluid).phases) == 2)
         scalars += 4 * bool(self.scene.output.peaks) + self.scene.output.schlieren
         return VECTOR + FLOAT * scalars
 
@@ -157,7 +162,7 @@ class Resources:
 
     # ---- time --------------------------------------------------------------------------------------------------------
 
-    def seconds(self, threads: int, bench: dict) -> float:
+    def seconds(self, threads: int, bench: Mapping[str, Any]) -> float:
         """Of the run with so many threads per rank, by a bench of the same machine.
 
         Work per step grows with the cells that are not at rest and with the particles, and is shared by all threads;
@@ -183,11 +188,11 @@ class Resources:
         )
         return max(tiles if self.cells else 1, self.particles // 100)
 
-    def _seconds_per_cell(self, bench: dict) -> float:
+    def _seconds_per_cell(self, bench: Mapping[str, Any]) -> float:
         """Of a time step, with the nearest of the benchmarks in two dimensions and the step to other ones."""
         if not self.cells:
             return 0.0
-        fluid, D = self.scene.fluid, self.dimensions
+        fluid, D = present(self.scene.fluid), self.dimensions
         eos = {type(phase.eos) for phase in fluid.phases}
         two = "shock_bubble" if eos == {IdealGas} else "water_air" if eos <= {IdealGas, StiffenedGas} else "tnt_air"
         rate = bench[f"{two if len(fluid.phases) == 2 else 'euler'}_2d"]["cell_stages_per_second"]
@@ -197,17 +202,17 @@ class Resources:
             rate *= bench["shock_bubble_2d_float32"]["cell_stages_per_second"] / bubble
         return len(SSP_RK3) / rate
 
-    def _seconds_per_particle(self, bench: dict) -> float:
+    def _seconds_per_particle(self, bench: Mapping[str, Any]) -> float:
         """Of a time step, by the form of the solid and the number of neighbours."""
         if not self.particles:
             return 0.0
-        solid, D = self.scene.solid, self.dimensions
+        solid, D = present(self.scene.solid), self.dimensions
         neighbours = (solid.smoothing / SMOOTHING) ** D
         bonded = f"bonded_copper_block_{D}d"
         block = bonded if solid.form == "total_lagrangian" and bonded in bench else f"copper_block_{D}d"
         return neighbours / bench[block]["particle_steps_per_second"]
 
-    def _seconds_at_wall(self, bench: dict) -> float:
+    def _seconds_at_wall(self, bench: Mapping[str, Any]) -> float:
         """Of a time step: what cells around the wall and particles cost in two benchmarks, a block and a plate."""
         if not self.band_cells:
             return 0.0

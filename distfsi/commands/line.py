@@ -1,0 +1,69 @@
+"""The command line `distfsi COMMAND ...`.
+
+Each command is a file of this folder. It has a docstring (the first line is the command's summary, the whole its help),
+`add_arguments(parser)` and `execute(arguments)`, and imports what computes only when it is executed, so that help comes
+at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from distfsi import __version__
+from distfsi.errors import DistfsiError, InputError
+
+COMMANDS = ("run", "check", "compile", "plot", "info", "examples", "study", "bench", "doctor", "schema")
+
+DESCRIPTION = "Shock waves and blasts that hit structures."
+EXAMPLES = """\
+examples:
+  distfsi examples sod                 copy an example into this folder
+  distfsi sod.toml                     run it (the same as `distfsi run sod.toml`)
+  mpiexec -n 4 distfsi sod.toml        run it on four MPI ranks
+  distfsi check sod.toml               what it will cost
+  distfsi plot out/sod                 draw its results
+
+`distfsi COMMAND --help` explains a command.
+exit codes: 0 done, 2 wrong input, 3 the state became unphysical, 74 results could not be written, 75 stopped early
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line; what it returns holds the command's `execute`."""
+    as_written = argparse.RawDescriptionHelpFormatter
+    main = argparse.ArgumentParser("distfsi", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=as_written)
+    main.add_argument("--version", action="version", version=__version__)
+    commands = main.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        module = import_module(f"distfsi.commands.{name}")
+        summary, _, rest = str(module.__doc__).partition("\n")
+        one = commands.add_parser(name, help=summary, description=summary, epilog=rest, formatter_class=as_written)
+        module.add_arguments(one)
+        one.set_defaults(execute=module.execute)
+    return main
+
+
+def main(words: Sequence[str]) -> None:
+    """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
+    if words and words[0] not in COMMANDS and not words[0].startswith("-"):
+        words = ["run", *words]
+    arguments = parser().parse_args(words)
+    arguments.execute(arguments)
+
+
+def command() -> None:
+    """The console command: `main` on the words of the process; a wrong input ends it with exit code 2."""
+    try:
+        main(sys.argv[1:])
+    except DistfsiError as error:
+        if not isinstance(error, InputError):  # only this rank may have met it: the exception hook ends the others
+            raise
+        print(error, file=sys.stderr)
+        sys.exit(error.exit_code)
+    except BrokenPipeError:  # who reads the output has gone: `distfsi examples | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

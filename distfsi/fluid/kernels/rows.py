@@ -1,0 +1,276 @@
+"""Rows of cells and faces: primitives, increments to faces, fluxes and their limiter, the update of a stage.
+
+These are the loops that must vectorise (`@row`); what P, T and F hold is told in fluid/kernels/records.py.
+"""
+
+from distfsi.device.markers import helper, int32, load, row, store
+from distfsi.fluid.kernels.records import CellFluxes, Cells, Faces, StageStep, States, position_of, variable_at
+from distfsi.formulas.subset import static_range
+from distfsi.formulas.symbols import (
+    ASYMMETRIC,
+    BISECTION_FALLBACK,
+    DIMENSIONS,
+    FLUXES,
+    FRACTIONAL,
+    GHOSTS,
+    PHASES,
+    SHARPENED,
+    TRANSVERSE_SENSOR,
+    VARIABLES,
+    before_relaxation,
+    face_flux,
+    fraction_after,
+    halved_range,
+    is_admissible,
+    limited_flux,
+    limiter_indicator,
+    primitives,
+    range_of_change,
+    reconstructed,
+    sharpened,
+    sound_speed,
+    updated,
+)
+
+HALVINGS = 80  # of the range of a volume fraction, down to the last bit also where one is a trace
+MINIMUM_VOLUME = 0.5  # of a cell: what has less is not the stage's to advance (coupling/cut_cells/kernels/band.py)
+
+
+# ---- primitives and increments ---------------------------------------------------------------------------------------
+
+
+@row
+def primitives_row(U, P, u, su, p, sp, n):
+    """P[p …] = primitives of the n cells at U[u …]; variables are su and sp apart."""
+    for i in range(n):
+        W = primitives(tuple(load(U, u + v * su + i) for v in static_range(VARIABLES)))
+        for v in static_range(VARIABLES):
+            store(P, p + v * sp + i, W[v])
+
+
+@helper
+def low_increment(v):
+    """Row of T with the increment of variable v from a cell's low face to its mean; that to its high face is row v."""
+    return v + VARIABLES if ASYMMETRIC else v
+
+
+@row
+def increments_row(P, T, p, sp, step, t, st, n):
+    """T[t …] = increments of the primitives of the n cells at P[p …] from the mean to the high face along the axis
+    whose cells are `step` apart, then where they differ those from the low face to the mean."""
+    for v in static_range(VARIABLES):
+        for i in range(n):
+            c = p + v * sp + i
+            cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
+            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else reconstructed(cells)
+            store(T, t + v * st + i, high)
+            if ASYMMETRIC:
+                store(T, t + low_increment(v) * st + i, low)
+
+
+# ---- the transverse pressure sensor ----------------------------------------------------------------------------------
+
+
+@helper
+def largest_jump(P, c, side):
+    """The larger pressure difference between a cell and its neighbours `side` away, whose pressures are around P[c]."""
+    return max(abs(load(P, c + side) - load(P, c)), abs(load(P, c) - load(P, c - side)))
+
+
+@helper
+def jump_along_face(P, c, faces: Faces):
+    """The largest pressure difference [Pa] between the face's two cells, the first of which is at P[c], and those
+    beside them."""
+    jump = max(largest_jump(P, c, faces.beside_1), largest_jump(P, c + faces.across, faces.beside_1))
+    if DIMENSIONS > 2:
+        other = max(largest_jump(P, c, faces.beside_2), largest_jump(P, c + faces.across, faces.beside_2))
+        jump = max(jump, other)
+    return jump
+
+
+@helper
+def jump_of_face(P, i, faces: Faces):
+    """What `face_flux` needs of the pressures around face i of a row."""
+    pressure = faces.cell + i + (PHASES + DIMENSIONS) * faces.variables
+    return jump_along_face(P, pressure, faces) if TRANSVERSE_SENSOR else 0.0
+
+
+# ---- fluxes ----------------------------------------------------------------------------------------------------------
+
+
+@helper
+def cell_mean(P, c, faces: Faces):
+    """Primitive state of the cell P[c], the velocity along the row's axis first."""
+    return tuple(load(P, c + variable_at(v, faces.axis) * faces.variables) for v in static_range(VARIABLES))
+
+
+@row
+def flux_row(P, T, F, faces: Faces, n):
+    """F = flux through the n faces, and behind it the indicator that tells whether the limiter must look at it; returns
+    how many it must."""
+    count = int32(0)
+    for i in range(n):
+        # the states at both sides of the face: cell means and their increments
+        low, high = cell_mean(P, faces.cell + i, faces), cell_mean(P, faces.cell + faces.across + i, faces)
+        left = tuple(
+            low[v] + load(T, faces.low + variable_at(v, faces.axis) * faces.rows + i) for v in static_range(VARIABLES)
+        )
+        right = tuple(
+            high[v] - load(T, faces.high + low_increment(variable_at(v, faces.axis)) * faces.rows + i)
+            for v in static_range(VARIABLES)
+        )
+        # the flux
+        flux = face_flux(left, right, jump_of_face(P, i, faces))
+        for v in static_range(FLUXES):
+            store(F, faces.flux + v * faces.rows + i, flux[v])
+        # the limiter's indicator
+        c = min(sound_speed(left), sound_speed(right))
+        if ASYMMETRIC:  # then a cell's mean may have a much lower one
+            c = min(c, min(sound_speed(low), sound_speed(high)))
+        indicator = limiter_indicator(low, high, flux, c, faces.rate)
+        store(F, faces.flux + FLUXES * faces.rows + i, indicator)
+        count = int32(count + (1 if indicator < 0.0 else 0))
+    return count
+
+
+@helper
+def next_negative(values, first, i, n):
+    """The first of the n values[first …] from i on that is negative or NaN; n if there is none."""
+    while i < n and load(values, first + i) >= 0.0:
+        i += 1
+    return i
+
+
+@row
+def limit_faces(P, F, faces: Faces, n, counted):
+    """Limit those of the n fluxes of `flux_row` whose indicator asks for it; returns how many of the first `counted`
+    were changed."""
+    count = 0
+    indicators = faces.flux + FLUXES * faces.rows
+    i = next_negative(F, indicators, 0, n)
+    while i < n:
+        low, high = cell_mean(P, faces.cell + i, faces), cell_mean(P, faces.cell + faces.across + i, faces)
+        flux = tuple(load(F, faces.flux + v * faces.rows + i) for v in static_range(FLUXES))
+        if not is_admissible(low, high, flux, faces.rate):
+            limited = limited_flux(low, high, flux, jump_of_face(P, i, faces), faces.rate)
+            for v in static_range(FLUXES):
+                store(F, faces.flux + v * faces.rows + i, limited[v])
+            count += 1 if i < counted else 0
+        i = next_negative(F, indicators, i + 1, n)
+    return count
+
+
+@helper
+def face_fluxes(P, T, F, faces: Faces, n, counted):
+    """`flux_row` and, if needed, `limit_faces`; returns how many of the first `counted` faces were limited."""
+    if flux_row(P, T, F, faces, n) > 0:
+        return limit_faces(P, F, faces, n, counted)
+    return 0
+
+
+# ---- the update ------------------------------------------------------------------------------------------------------
+
+
+@helper
+def divergence(F, v, i, fluxes: CellFluxes, step: StageStep):
+    """dt times the flux divergence of variable v in cell i of a row."""
+    x = fluxes.x + v * fluxes.rows + i
+    total = (load(F, x + 1) - load(F, x)) * step.x
+    if DIMENSIONS > 1:
+        y = position_of(v, 1) * fluxes.rows + i
+        total = total + (load(F, fluxes.y_high + y) - load(F, fluxes.y_low + y)) * step.y
+    if DIMENSIONS > 2:
+        z = position_of(v, 2) * fluxes.rows + i
+        total = total + (load(F, fluxes.z_high + z) - load(F, fluxes.z_low + z)) * step.z
+    return total
+
+
+@helper
+def change_by_fluxes(F, volumes, i, cells: Cells, fluxes: CellFluxes, step: StageStep):
+    """dt times the flux divergence of all variables in cell i of a row, per volume of its fluid."""
+    D = tuple(divergence(F, v, i, fluxes, step) for v in static_range(FLUXES))
+    if FRACTIONAL:
+        concentration = 1.0 / max(load(volumes, cells.volume + i), MINIMUM_VOLUME)
+        return tuple(D[v] * concentration for v in static_range(FLUXES))
+    return D
+
+
+@helper
+def state_of_cell(U, i, cells: Cells):
+    """State of cell i of a row."""
+    return tuple(load(U, cells.state + v * cells.state_variables + i) for v in static_range(VARIABLES))
+
+
+@helper
+def primitives_of_cell(P, i, cells: Cells):
+    """Primitives of cell i of a row."""
+    return tuple(load(P, cells.primitive + v * cells.primitive_variables + i) for v in static_range(VARIABLES))
+
+
+@row
+def update_row(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step: StageStep, n):
+    """states.after = one Runge-Kutta stage of the n cells.
+
+    Returns how many of them have not relaxed; T[0 …] is negative for those.
+    """
+    count = int32(0)
+    for i in range(n):
+        new = updated(
+            state_of_cell(states.before, i, cells),
+            state_of_cell(states.now, i, cells),
+            primitives_of_cell(P, i, cells),
+            change_by_fluxes(F, states.volumes, i, cells, fluxes, step),
+            step.b,
+            step.dt,
+        )
+        for v in static_range(VARIABLES):
+            store(states.after, cells.state + v * cells.state_variables + i, new[v])
+        if BISECTION_FALLBACK:
+            store(T, i, new[VARIABLES])
+            count = int32(count + (1 if new[VARIABLES] < 0.0 else 0))
+    return count
+
+
+@row
+def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step: StageStep, n):
+    """Relax those of the n cells by bisection that `update_row` has not."""
+    i = next_negative(T, 0, 0, n)
+    while i < n:
+        before = state_of_cell(states.before, i, cells)
+        phases, moved = before_relaxation(
+            before,
+            state_of_cell(states.now, i, cells),
+            primitives_of_cell(P, i, cells),
+            change_by_fluxes(F, states.volumes, i, cells, fluxes, step),
+            step.b,
+            step.dt,
+        )
+        low, high = range_of_change(phases)
+        for _ in range(HALVINGS):
+            low, high = halved_range(phases, low, high)
+        fraction = fraction_after(before, moved + 0.5 * (low + high))
+        store(states.after, cells.state + (VARIABLES - 1) * cells.state_variables + i, fraction)
+        i = next_negative(T, 0, i + 1, n)
+
+
+# ---- cells that are alike --------------------------------------------------------------------------------------------
+
+
+@row
+def count_unlike(U, u, first, su, n):
+    """How many values of the n cells at U[u …] differ from those of the cell at `first`; a NaN differs from all."""
+    count = 0
+    for v in static_range(VARIABLES):
+        value = load(U, first + v * su)
+        for i in range(n):
+            count += 1 if load(U, u + v * su + i) != value else 0
+    return count
+
+
+@row
+def repeat_row(U, u, first, su, n):
+    """The n cells at U[u …] get the values of the cell at `first`."""
+    for v in static_range(VARIABLES):
+        value = load(U, first + v * su)
+        for i in range(n):
+            store(U, u + v * su + i, value)

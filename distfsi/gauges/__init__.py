@@ -1,0 +1,149 @@
+"""What a gauge is: a frozen dataclass in a file of this folder, named by the word that chooses it in the input.
+
+Its fields carry unit, range and meaning as those of a law (laws/law.py); table, schema and reference of the input
+follow from them. When a run begins `probe` gives what samples it; when samples are due, the files they go to, and
+restarts are the same for all kinds (diagnostics/gauges.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from distfsi.laws.law import Law, quantity
+
+AXES = "xyz"
+Kept = Mapping[str, np.ndarray]
+
+
+def each_step() -> Any:
+    """The field `every` of a gauge that samples each step unless the input says otherwise."""
+    return quantity("s", "time between samples; default each step", default=None, above=0.0)
+
+
+def each_hundredth() -> Any:
+    """The field `every` of a gauge that by default takes a hundred samples."""
+    return quantity("s", "time between samples; default a hundredth of the run", default=None, above=0.0)
+
+
+class Gauge(Law):
+    """A gauge of any kind.
+
+    needs     what it samples: "fluid" or "solid"
+    per_step  whether it samples each step where the input does not say how often; else a hundredth of the run
+    every     time between samples [s], or None
+    """
+
+    folder = "gauges"
+    needs: ClassVar[str] = "fluid"
+    per_step: ClassVar[bool] = True
+    every: float | None
+
+    def interval(self, end: float) -> float:
+        """Time between samples [s] in a run until `end` [s]; 0: each step."""
+        return self.every or (0.0 if self.per_step else end / 100)
+
+    def positions(self) -> Mapping[str, Mapping[int, float]]:
+        """Keys of positions in the fluid, each with its coordinate [m] by axis."""
+        return {}
+
+    def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """Keys whose values do not fit into a scene, each with what is wrong with it."""
+        yield from ()
+
+    def probe(self, run: Run) -> Probe:
+        """Collective. What samples the run, which begins."""
+        raise NotImplementedError
+
+
+class FluidPoints(Protocol):
+    """The fluid at fixed points; `columns` are names with units."""
+
+    columns: list[str]
+
+    def values(self) -> np.ndarray:
+        """Collective. The values (n, columns) at the points now, on every rank; NaN in covered cells."""
+
+
+class Particles(Protocol):
+    """The particles of this rank."""
+
+    columns: Mapping[str, np.ndarray]
+    dimensions: int
+
+    def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """The fields of the rows that are `chosen`, vectors with three components."""
+
+    def body_totals(self, body: int) -> dict[str, np.ndarray]:
+        """Collective. mass [kg], center of mass, momentum of a body, and the fluid's impulse on it in the last step."""
+
+
+class Run(Protocol):
+    """What a gauge may ask of a run.
+
+    communicator  all ranks
+    blocks        the fluid's cells: `grid`, `block_cells`, and the global index `origin` (own blocks, 3) of the first
+                  cell of each
+    bodies        names of the bodies
+    """
+
+    communicator: Any
+    blocks: Any
+    bodies: Sequence[str]
+
+    @property
+    def dt(self) -> float:
+        """[s] of the last step; 0 before the first."""
+
+    @property
+    def particles(self) -> Particles:
+        """Of the solid."""
+
+    def fluid_points(self, positions: np.ndarray) -> FluidPoints:
+        """The fluid at positions (n, D) [m]."""
+
+    def fluid_fields(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
+        """Collective. The fields of cells, as they are written, of local blocks that are `chosen`."""
+
+
+class Probe:
+    """Samples a run for one gauge."""
+
+    def kept(self) -> Kept:
+        """What a restart needs of it, by name."""
+        return {}
+
+    def bring_back(self, kept: Kept) -> None:
+        """Go on from what was kept."""
+
+
+class TableProbe(Probe):
+    """Samples are rows of a table; `columns` are names with units, without the time."""
+
+    columns: list[str]
+
+    def rows(self, run: Run) -> np.ndarray:
+        """Collective. Rows (n, columns) of the present state, on rank 0 at least."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Cells of a grid, as blocks for the output."""
+
+    grid: Any
+    block_cells: tuple[int, ...]
+    origin: np.ndarray
+
+
+class LayerProbe(Probe):
+    """Samples are fields of some cells: those of a `layer`."""
+
+    layer: Layer
+
+    def fields(self, run: Run) -> dict[str, np.ndarray]:
+        """Collective. The fields of the layer's blocks now."""
+        raise NotImplementedError

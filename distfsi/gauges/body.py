@@ -1,0 +1,53 @@
+"""A body as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from distfsi.gauges import AXES, Gauge, Kept, Run, TableProbe, each_step
+from distfsi.laws.law import entry
+
+QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": "N s"}
+
+
+@dataclass(frozen=True)
+class BodyGauge(Gauge):
+    """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
+    mass, momentum."""
+
+    body: str = entry("name of the body")
+    every: float | None = each_step()
+
+    needs = "solid"
+
+    def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
+        if self.body not in bodies:
+            yield "body", f"'{self.body}' is no body"
+
+    def probe(self, run: Run) -> TableProbe:
+        return BodyProbe(self, run)
+
+
+class BodyProbe(TableProbe):
+    """Displacements are from where the body was when the run began."""
+
+    def __init__(self, gauge: BodyGauge, run: Run):
+        axes = AXES[: run.particles.dimensions]
+        self.columns = [f"{name}_{axis} [{unit}]" for name, unit in QUANTITIES.items() for axis in axes]
+        self._body = run.bodies.index(gauge.body)
+        self._start = run.particles.body_totals(self._body)["center"]
+
+    def rows(self, run: Run) -> np.ndarray:
+        totals = run.particles.body_totals(self._body)
+        force = totals["impulse"] / run.dt if run.dt > 0.0 else np.full_like(self._start, np.nan)
+        velocity = totals["momentum"] / totals["mass"]
+        return np.concatenate([force, velocity, totals["center"] - self._start, totals["momentum"]])[None]
+
+    def kept(self) -> Kept:
+        return {"start": self._start}
+
+    def bring_back(self, kept: Kept) -> None:
+        self._start = kept["start"]

@@ -1,0 +1,41 @@
+"""The fluid along a line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from distfsi.gauges import AXES, Gauge, Run, TableProbe, each_hundredth
+from distfsi.laws.law import entry, vector
+
+
+@dataclass(frozen=True)
+class LineGauge(Gauge):
+    """The fluid at equidistant points of a line: one row per point and time, values as for a point."""
+
+    start: tuple[float, ...] = vector("m", "first point", key="from")
+    end: tuple[float, ...] = vector("m", "last point", key="to")
+    points: int = entry("number of points, the ends included", at_least=2)
+    every: float | None = each_hundredth()
+
+    per_step = False
+
+    def positions(self) -> Mapping[str, Mapping[int, float]]:
+        return {"from": dict(enumerate(self.start)), "to": dict(enumerate(self.end))}
+
+    def probe(self, run: Run) -> TableProbe:
+        return LineProbe(self, run)
+
+
+class LineProbe(TableProbe):
+    """A row per point, which begins with its position."""
+
+    def __init__(self, gauge: LineGauge, run: Run):
+        self._positions = np.linspace(gauge.start, gauge.end, gauge.points)
+        self._points = run.fluid_points(self._positions)
+        self.columns = [f"{axis} [m]" for axis in AXES[: self._positions.shape[1]]] + self._points.columns
+
+    def rows(self, run: Run) -> np.ndarray:
+        return np.hstack([self._positions, self._points.values()])

@@ -1,0 +1,38 @@
+"""The fluid at a point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from distfsi.gauges import Gauge, Run, TableProbe, each_step
+from distfsi.laws.law import vector
+
+
+@dataclass(frozen=True)
+class PointGauge(Gauge):
+    """The fluid at a point: pressure, density, velocity and, with two phases, volume fraction in gauges/NAME.csv.
+    Values are linear between cell centers; covered cells do not count, and in a covered cell there is no value
+    (nan)."""
+
+    position: tuple[float, ...] = vector("m", "where")
+    every: float | None = each_step()
+
+    def positions(self) -> Mapping[str, Mapping[int, float]]:
+        return {"position": dict(enumerate(self.position))}
+
+    def probe(self, run: Run) -> TableProbe:
+        return PointProbe(self, run)
+
+
+class PointProbe(TableProbe):
+    """A row of values per sample."""
+
+    def __init__(self, gauge: PointGauge, run: Run):
+        self._points = run.fluid_points(np.array([gauge.position]))
+        self.columns = self._points.columns
+
+    def rows(self, run: Run) -> np.ndarray:
+        return self._points.values()

@@ -1,0 +1,87 @@
+"""What a run will cost and what it could do without, told before it starts: `distfsi check`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from distfsi.output.progress import format_duration
+from distfsi.output.scales import format_bytes
+from distfsi.resources.estimate import Resources
+from distfsi.scene.advice import advice, thickness
+from distfsi.scene.description import Body, Scene
+
+
+def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, Any] | None = None) -> str:
+    """Sizes, memory, output, steps and time of `scene` on so many ranks, and advice, as text.
+
+    `bench`: what `bench.kept_bench` gives, for the time.
+    """
+    domain, resources = scene.domain, Resources(scene, ranks)
+    size = " x ".join(f"{b - a:.6g}" for a, b in zip(domain.lower, domain.upper, strict=True))
+    lines = [
+        scene.title,
+        _line("domain", f"{size} m, {' x '.join(map(str, domain.cells))} cells of {_metres(domain.spacing)}"),
+        _line("blocks", _blocks(resources)),
+    ]
+    if scene.fluid:
+        names = " and ".join(phase.name for phase in scene.fluid.phases)
+        lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
+    for body in scene.solid.bodies if scene.solid else ():
+        lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
+    lines += [
+        _line("memory", _memory(resources)),
+        _line("output", _output(resources)),
+        _line("steps", f"about {resources.steps:,}, if no wave becomes faster than the first ones"),
+        _line("time", _time(resources, threads, bench)),
+    ]
+    return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+
+
+def _line(name: str, text: str) -> str:
+    return f"  {name:<11}{text}"
+
+
+def _blocks(resources: Resources) -> str:
+    blocks = resources.blocks[0]
+    shape = " x ".join(map(str, blocks.block_cells[: resources.dimensions]))
+    text = f"{blocks.count} of {shape} cells"
+    if resources.ranks == 1:
+        return text
+    counts = [b.local_count for b in resources.blocks]
+    text += f"; {min(counts)} to {max(counts)} on each of {resources.ranks} ranks"
+    idle = counts.count(0)
+    return text + (f"; {idle} have none: smaller blocks or fewer ranks" if idle else "")
+
+
+def _body(body: Body, particles: int, scene: Scene) -> str:
+    text = f"{body.name}: {particles:,} particles {_metres((body.spacing,))} apart"
+    thick = thickness(body, scene.domain)
+    if thick is None:
+        return text
+    text += f", {thick:.4g} m thick: {thick / body.spacing:.3g} particles"
+    return text + (f", {thick / min(scene.domain.spacing):.3g} cells" if scene.fluid else "")
+
+
+def _memory(resources: Resources) -> str:
+    arrays = format_bytes(resources.arrays())
+    return f"about {format_bytes(resources.memory())} per rank, {arrays} of it for cells and particles; none of a GPU"
+
+
+def _output(resources: Resources) -> str:
+    times, each = resources.output_times(), resources.output_bytes()
+    total = f"{format_bytes(times * each)} in all, in {resources.scene.output.directory}"
+    return f"{times} field outputs of about {format_bytes(each)}, {total}"
+
+
+def _time(resources: Resources, threads: int, bench: Mapping[str, Any] | None) -> str:
+    if bench is None:
+        return "unknown: `distfsi bench` measures this machine once for all"
+    seconds = resources.seconds(threads, bench)
+    machine = f"{resources.ranks} rank(s) of {threads} thread(s), by the bench of this machine"
+    return f"about {format_duration(max(seconds, 1.0))} on {machine}; compiling, the first time, comes on top"
+
+
+def _metres(lengths: tuple[float, ...]) -> str:
+    distinct = lengths if len({f"{h:.6g}" for h in lengths}) > 1 else lengths[:1]
+    return " x ".join(f"{h:.6g}" for h in distinct) + " m"
