@@ -9,6 +9,7 @@ import numpy as np
 
 from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
+from distfsi.narrowing import present
 from distfsi.solid.kernels import contact as kernels
 from distfsi.solid.kernels.records import SMOOTHING, UNBONDED, Contacts, Neighbours, Particles, SearchMemory
 from distfsi.solid.neighbours import Near, NeighbourSearch
@@ -61,7 +62,7 @@ class Contact:
         self._chosen = rows
         self._contacts = Contacts(near.position, near.state, reference, size, rupture_length, side)
 
-    def _still_valid(self, number: int, known: tuple) -> bool:
+    def _still_valid(self, number: int, known: tuple[Any, ...]) -> bool:
         if self._last is None or self._last.identity.shape[0] != number:
             return False
         mark = self._device.empty(number, np.int8)
@@ -110,5 +111,5 @@ class Contact:
         self._run(self._kernels.heat_contacts, mass, dt, motion, energy)
 
     def _run(self, kernel: Any, *arguments: Any) -> None:
-        pairs = (self._chosen, self._neighbours, self._contacts)
-        self._device.run(kernel, self._neighbours.count.shape[0], *pairs, *arguments)
+        neighbours = present(self._neighbours)
+        self._device.run(kernel, neighbours.count.shape[0], self._chosen, neighbours, self._contacts, *arguments)

@@ -22,9 +22,8 @@ from distfsi.mesh.kernels import particles as particle_kernels
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
+from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.scene.packing import initial_velocity, pack
-from distfsi.scene.shapes import contains
 from distfsi.solid import fields, neighbours, pieces, total_lagrangian, updated
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.kernels import motion
@@ -32,6 +31,7 @@ from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.packed import packed
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
@@ -71,10 +71,11 @@ class Solid:
     def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = D = scene.domain.dimensions
-        self.materials = Materials(scene.solid, D)
+        self._scene = solid = present(scene.solid)
+        self.materials = Materials(solid, D)
         self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
         self.body_force = BodyForce(scene.sources, D)
-        constants = self._constants(scene)
+        constants = self._constants()
         self.kernels = team.build(DRIVERS, constants)
         self._points = MaterialGroups(self.materials, team, constants)
         self._von_mises = plain(von_mises, constants)
@@ -84,7 +85,7 @@ class Solid:
         self._boundary_impulse = np.zeros((blocks.local_count, D))
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
-        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), D))
+        self.given = np.zeros((blocks.local_count, len(solid.bodies), D))
         # What prepare() finds.
         self._near: Near | None = None
         self._acceleration, self._limits = team.empty((0, D)), team.empty((0, len(LIMITS)))
@@ -102,51 +103,33 @@ class Solid:
         self._points.deform(self.columns, 0.0, team.zeros((self.count, D**2)))
         self.form.bind(self.columns, self.exchange)
 
-    def _constants(self, scene: Scene) -> dict[str, object]:
+    def _constants(self) -> dict[str, object]:
         """What the kernels are specialised for."""
-        D = self.dimensions
+        solid, D = self._scene, self.dimensions
         return {
             "DIMENSIONS": D,
             "COMPONENTS": D * (D + 1) // 2,
             "BODY_FORCE": self.body_force.acceleration,
-            "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
-            "VISCOSITY_BETA": scene.solid.viscosity_beta,
-            "SMOOTHING_RATIO": scene.solid.smoothing,
-            "ARTIFICIAL_STRESS": scene.solid.artificial_stress,
-            "ZERO_ENERGY": scene.solid.zero_energy,
+            "VISCOSITY_ALPHA": solid.viscosity_alpha,
+            "VISCOSITY_BETA": solid.viscosity_beta,
+            "SMOOTHING_RATIO": solid.smoothing,
+            "ARTIFICIAL_STRESS": solid.artificial_stress,
+            "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
 
     def _form(self, scene: Scene) -> SolidForm:
-        search = NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
-        if any(scene.solid.form_of(body) == "total_lagrangian" for body in scene.solid.bodies):
-            given = (self.communicator, scene.solid, self._points, self.dimensions)
+        solid, search = self._scene, NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
+        if any(solid.form_of(body) == "total_lagrangian" for body in solid.bodies):
+            given = (self.communicator, solid, self._points, self.dimensions)
             return TotalLagrangian(self.kernels, self.exchange, search, *given)
-        repels = scene.solid.artificial_stress > 0.0
+        repels = solid.artificial_stress > 0.0
         return UpdatedLagrangian(self.kernels, self.team, search, self.dimensions, repels)
 
     def _own_particles(self, scene: Scene) -> dict[str, np.ndarray]:
-        """Pack the bodies; the columns of the particles in this rank's blocks."""
-        columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
-        columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-        columns["id"] = np.arange(len(columns["body"]))
+        """The columns of the particles in this rank's blocks."""
+        columns = packed(scene)
         mine = self.blocks.owners[self.blocks.block_of(columns["position"])] == self.communicator.rank
         return {name: column[mine] for name, column in columns.items()}
-
-    def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
-        body = scene.solid.bodies[b]
-        position, volume = pack(body, scene.domain.lower, scene.domain.upper)
-        n = len(position)
-        fixed = np.zeros(n, dtype=bool) if body.fixed is None else contains(body.fixed, position)
-        return {
-            "body": np.full(n, b),
-            "position": position,
-            "velocity": np.where(fixed[:, None], body.fixed_velocity or 0.0, initial_velocity(body, position)),
-            "fixed": fixed,
-            "mass": body.density * volume,
-            "density": np.full(n, body.density),
-            "h": np.full(n, scene.solid.smoothing * body.spacing),
-            "energy": np.zeros(n),
-        }
 
     # ---- the step ---------------------------------------------------------------------------------------------------
 
@@ -158,9 +141,10 @@ class Solid:
         there are such. Raises Diverged on all ranks when a smoothing length is not finite.
         """
         c, device, own = self.columns, self.team, self.count
-        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
-        support, *flags = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
-        support *= 2.0
+        (h,) = c.read("h")
+        largest = self.exchange.rows.largest(h, 0.0)
+        maxima = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
+        support, flags = 2.0 * maxima[0], maxima[1:]
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
         state, parity = device.empty((own, VELOCITY + self.dimensions)), ((),) * VELOCITY
@@ -185,7 +169,7 @@ class Solid:
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
-        dt, index = rows.minimum(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        dt, index = rows.minimum(rows.taken(self._limits, present(self._groups).rows).reshape(-1))
         particle, cause = divmod(index, len(LIMITS))
         dt, id = float(dt), self.columns["id"][self._order[particle]]
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
@@ -211,9 +195,9 @@ class Solid:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
         c, device, D = self.columns, self.team, self.dimensions
         (velocity,) = c.read("velocity")
-        (around,) = self._near.plan.exchange([(velocity, self._vector)])
+        (around,) = self.around.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
-        self.form.strain(c, self._near, dt, around, gradient)
+        self.form.strain(c, self.around, dt, around, gradient)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
@@ -273,12 +257,12 @@ class Solid:
 
     def _per_body(self, values: Any) -> np.ndarray:
         """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
-        return self._groups.sums(values).reshape(*self.given.shape[:2], values.shape[1])
+        return present(self._groups).sums(values).reshape(*self.given.shape[:2], values.shape[1])
 
     @property
     def around(self) -> Near:
         """Own particles, ghosts and images as of prepare()."""
-        return self._near
+        return present(self._near)
 
     def check(self, time: float) -> None:
         """Raise Diverged, naming the particle, if one of this rank has no valid state at `time` [s]."""

@@ -13,13 +13,15 @@ import numpy as np
 
 from distfsi.device.interface import Columns
 from distfsi.mesh.communicator import Communicator
-from distfsi.mesh.particles import IMAGES, Parity, ParticleExchange
+from distfsi.mesh.kernels.particles import IMAGES
+from distfsi.mesh.particles import Parity, ParticleExchange
+from distfsi.narrowing import present
 from distfsi.scene.description import Solid
 from distfsi.solid import bonds, contact, pieces
 from distfsi.solid.bonds import BondNetwork, chunks_of
 from distfsi.solid.contact import Contact
 from distfsi.solid.kernels import bonds as kernels
-from distfsi.solid.kernels import cracks, motion, pairs
+from distfsi.solid.kernels import cracks, motion
 from distfsi.solid.kernels.records import (
     CRACK,
     NEVER_BONDED,
@@ -50,8 +52,8 @@ DRIVERS = (
     kernels.strain_bonds,
     kernels.limit_bonds,
     motion.pack_motion,
-    pairs.carry_unbonded,
-    pairs.keep_rates,
+    cracks.carry_unbonded,
+    cracks.keep_rates,
     *contact.DRIVERS,
 )
 
@@ -108,7 +110,8 @@ class TotalLagrangian:
         if self._mixed:
             self._unbonded.bind(c, exchange)
         # Fit the bonds to no displacement.
-        plan = exchange.ghosts(*c.read("position"), c["id"], network.support, self.requested_keys(c))
+        (position,) = c.read("position")
+        plan = exchange.ghosts(position, c["id"], network.support, self.requested_keys(c))
         volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
         reference, volume = plan.exchange([(*c.read("reference"), "position"), (volume, ((),))])
         bonds = network.find(c, plan.key, reference, volume)
@@ -128,7 +131,8 @@ class TotalLagrangian:
         if self._communicator.maximum(np.array([self._cut_since_labelled]))[0] == 0.0:
             return
         self._cut_since_labelled = False
-        plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.requested_keys(c))
+        (position,) = c.read("position")
+        plan = exchange.ghosts(position, c["id"], 0.0, self.requested_keys(c))
         id = plan.key.host[plan.key.host % IMAGES == 0] // IMAGES
         order = np.argsort(id, kind="stable")
         links = [np.empty((2, 0), dtype=np.int64)]
@@ -209,9 +213,10 @@ class TotalLagrangian:
     def _carried(self, c: Columns, near: Near, rates: list[Any]) -> Carried:
         """What particles without bonds act on each other with; `rates`: their velocity gradients if any has one."""
         D, (pressure, deviator) = self._dimensions, c.read("pressure", "deviator")
-        carried = (self._device.empty(near.own), self._device.empty(deviator.shape))
-        self._run(near.own, "carry_unbonded", *c.read("bond_count"), pressure, deviator, *carried)
-        return Carried(*(rates or [self._device.zeros((near.plan.count, D * D))]), *carried)
+        found = rates[0] if rates else self._device.zeros((near.plan.count, D * D))
+        carried = Carried(found, self._device.empty(near.own), self._device.empty(deviator.shape))
+        self._run(near.own, "carry_unbonded", *c.read("bond_count"), pressure, deviator, *carried[1:])
+        return carried
 
     def _cut(self, c: Columns, near: Near, bonds: Bonds) -> None:
         """Cut bonds and fit what is left; a particle that too few bonds hold detaches in the next step."""
@@ -253,9 +258,10 @@ class TotalLagrangian:
         energy, viscous_pressure, detaching = c.write("energy", "viscous_pressure", "detaching")
         result = StrainResult(energy, viscous_pressure, gradient, detaching)
         self._run(near.own, "strain_bonds", dt, self._bonds, self._bond_state, motion, point, fit, result)
-        self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
+        (mass,), (energy,) = c.read("mass"), c.write("energy")
+        self._contact.heat(mass, dt, motion, energy)
         if breaking and dt > 0.0:
-            self._materials.open_voids(c, dt, self._bonds.count, gradient)
+            self._materials.open_voids(c, dt, present(self._bonds).count, gradient)
 
     def _run(self, count: int, kernel: str, *arguments: Any) -> None:
         self._device.run(getattr(self._kernels, kernel), count, *arguments)

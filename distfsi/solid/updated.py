@@ -76,10 +76,10 @@ class UpdatedLagrangian:
 
     def _act(self, near: Near, neighbours: Neighbours, carried: Carried, acceleration: Any, limits: Any) -> None:
         D, own, run, pairs = self._dimensions, near.own, self._device.run, (near.particles, neighbours)
-        tension = near.tensor if self._repels else ()
-        correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
+        parity = near.matrix + (near.tensor if self._repels else ())
+        correction, stress = (self._device.empty((own, width)) for width in (D * D, len(parity)))
         run(self._kernels.correct_gradients, own, *pairs, carried.pressure, carried.deviator, correction, stress)
-        (stress,) = near.plan.exchange([(stress, near.matrix + tension)])
+        (stress,) = near.plan.exchange([(stress, parity)])
         if self._viscous.shape != neighbours.table.shape:
             self._viscous = self._device.empty(neighbours.table.shape)
         run(self._kernels.accelerate_pairs, own, *pairs, carried.rates, stress, acceleration, limits, self._viscous)

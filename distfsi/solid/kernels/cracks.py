@@ -4,7 +4,7 @@ from math import sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS
+from distfsi.formulas.symbols import COMPONENTS, DIMENSIONS
 from distfsi.formulas.tensors import dot, times
 from distfsi.solid.formulas.bonds import crack_seen, is_face, maximum_stretch_direction
 from distfsi.solid.kernels.bonds import bond_weight
@@ -184,3 +184,25 @@ def cut_bonds(begin, end, position, reference, bodies: Bodies, body, payload, ke
         lost[i] = max(bonds.count[i], 0) - kept
         if lost[i] > 0:
             bonds.count[i] = kept
+
+
+# ---- without bonds ---------------------------------------------------------------------------------------------------
+
+
+@driver
+def carry_unbonded(begin, end, bond_count, pressure, deviator, carried_pressure, carried_deviator):
+    """What particles act with that have no bonds: all that they carry where their body never had bonds, but debris with
+    no tension and no shear."""
+    for i in range(begin, end):
+        whole = bond_count[i] == NEVER_BONDED
+        carried_pressure[i] = pressure[i] if whole else max(pressure[i], 0.0)
+        for c in static_range(COMPONENTS):
+            carried_deviator[i, c] = deviator[i, c] if whole else 0.0
+
+
+@driver
+def keep_rates(begin, end, bond_count, gradient, rates):
+    """rates[i] = velocity gradient of a particle whose body never had bonds; 0 for others: each approach is damped."""
+    for i in range(begin, end):
+        for k in static_range(DIMENSIONS * DIMENSIONS):
+            rates[i, k] = gradient[i, k] if bond_count[i] == NEVER_BONDED else 0.0

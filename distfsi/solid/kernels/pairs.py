@@ -33,7 +33,6 @@ from distfsi.solid.kernels.matrices import (
 from distfsi.solid.kernels.records import (
     DENSITY,
     MASS,
-    NEVER_BONDED,
     SMOOTHING,
     SOUND_SPEED,
     VELOCITY,
@@ -104,25 +103,6 @@ def correct_gradients(begin, end, particles: Particles, neighbours: Neighbours, 
             tension = components(positive_part(sigma))
             for c in static_range(COMPONENTS):
                 stress[i, DIMENSIONS * DIMENSIONS + c] = tension[c]
-
-
-@driver
-def carry_unbonded(begin, end, bond_count, pressure, deviator, carried_pressure, carried_deviator):
-    """What particles act with that have no bonds: all that they carry where their body never had bonds, but debris with
-    no tension and no shear."""
-    for i in range(begin, end):
-        whole = bond_count[i] == NEVER_BONDED
-        carried_pressure[i] = pressure[i] if whole else max(pressure[i], 0.0)
-        for c in static_range(COMPONENTS):
-            carried_deviator[i, c] = deviator[i, c] if whole else 0.0
-
-
-@driver
-def keep_rates(begin, end, bond_count, gradient, rates):
-    """rates[i] = velocity gradient of a particle whose body never had bonds; 0 for others: each approach is damped."""
-    for i in range(begin, end):
-        for k in static_range(DIMENSIONS * DIMENSIONS):
-            rates[i, k] = gradient[i, k] if bond_count[i] == NEVER_BONDED else 0.0
 
 
 @driver
