@@ -7,7 +7,7 @@ call.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -52,14 +52,21 @@ def body_of(module: str) -> Callable:
             result = ir.VoidType() if not kinds else kinds[0] if len(kinds) == 1 else ir.LiteralStructType(kinds)
             function_type = ir.FunctionType(result, [leaf.type for leaf in leaves])
             called = builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), leaves)
-            if len(kinds) < 2:
-                return called if kinds else context.get_dummy_value()
-            parts = [builder.extract_value(called, k) for k in range(len(kinds))]
-            return context.make_tuple(builder, signature.return_type, parts)
+            if not kinds:
+                return context.get_dummy_value()
+            parts = [called] if len(kinds) == 1 else [builder.extract_value(called, k) for k in range(len(kinds))]
+            return _whole(context, builder, signature.return_type, iter(parts))
 
         return _numba_type(returns)(arguments), code
 
     return body
+
+
+def _whole(context, builder, kind: types.Type, leaves: Iterator[ir.Value]) -> ir.Value:
+    """A value of numba made of its leaves, tuples in it one behind the other."""
+    if not isinstance(kind, types.BaseTuple):
+        return next(leaves)
+    return context.make_tuple(builder, kind, [_whole(context, builder, part, leaves) for part in kind.types])
 
 
 class _Written:
