@@ -23,23 +23,23 @@ def body_of(eos, strength, density=7830.0, failure=None, spacing=1e-3, D=3):
 class Points:
     """Particles of several bodies, of which `body` (n,) are the numbers."""
 
-    def __init__(self, bodies, body, rate="jaumann", D=3):
+    def __init__(self, bodies, body, rate="jaumann", D=3, device=None):
         bodies = tuple(replace(each, name=f"body {b}") for b, each in enumerate(bodies))
         materials = Materials(d.Solid(bodies, 1.3, 1.0, 2.0, rate), D)
         constants = {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2} | materials.constants
-        body, self.count = np.asarray(body), len(body)
+        body, self.count, self.device = np.asarray(body), len(body), device or cpu.Team(1)
         size = np.array([each.spacing for each in bodies])[body]
         columns = materials.initial(body, np.arange(self.count), size**D) | {"body": body, "h": 1.3 * size}
         columns |= {"energy": np.zeros(self.count), "density": np.array([each.density for each in bodies])[body]}
-        self.columns = Columns(cpu.Team(1), columns)
-        self.groups = MaterialGroups(materials, cpu.Team(1), constants)
+        self.columns = Columns(self.device, columns)
+        self.groups = MaterialGroups(materials, self.device, constants)
         self.groups.select(body)
         self.strain(0.0, np.zeros((D, D)))
 
     def strain(self, dt, gradient):
         """Strain all particles by `dt` of one velocity gradient (D, D), or each by its own (count, D, D)."""
         rates = np.broadcast_to(np.asarray(gradient, dtype=float), (self.count, *np.shape(gradient)[-2:]))
-        self.groups.deform(self.columns, dt, np.ascontiguousarray(rates.reshape(self.count, -1)))
+        self.groups.deform(self.columns, dt, self.device.array(np.ascontiguousarray(rates.reshape(self.count, -1))))
         return self
 
     def __getattr__(self, name):

@@ -27,8 +27,9 @@ SOFT_EOS = LinearEos(bulk_modulus=3.25e9)
 SOFT = PerfectlyPlastic(shear_modulus=0.7e9, yield_stress=2e7)
 
 
-def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None, failure=None):
-    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), eos, strength, fixed, failure)
+def body(shape, spacing, density, velocity, eos=COPPER_EOS, strength=COPPER, fixed=None, failure=None, form=None):
+    laws = (eos, strength, fixed, failure)
+    return d.Body("body", shape, spacing, density, tuple(map(float, velocity)), *laws, form=form)
 
 
 def solid(
@@ -114,6 +115,16 @@ def bonded_discs(team):
     return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, form="total_lagrangian"), 80
 
 
+def discs_of_two_forms(team):
+    """A bonded disc between two of other forms and materials, of which one tears it apart."""
+    failure = JohnsonCookFailure(0.1, 0.0, 0.0, 0.0, 0.0, 1.0, None, 0.0, None)
+    bonded = body(d.Ball((0.0, 0.0), 0.25), 0.05, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, failure=failure)
+    fast = body(d.Ball((-0.5, 0.1), 0.2), 0.05, 8930.0, (900.0, 0.0), form="updated_lagrangian")
+    slow = body(d.Ball((0.6, 0.0), 0.2), 0.04, 2000.0, (-100.0, 0.0), SOFT_EOS, SOFT, form="updated_lagrangian")
+    box = (-1.0, 0.0), (1.0, 1.0), (1,)
+    return solid([fast, bonded, slow], *box, team, 2, form="total_lagrangian"), 120
+
+
 def bursting_ball(team, communicator=None):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
     failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, Scatter(10.0, 0.1, 1))
@@ -128,7 +139,7 @@ def bursting_ball(team, communicator=None):
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
-    for case in (colliding_discs, colliding_balls, bonded_discs, bursting_ball):
+    for case in (colliding_discs, colliding_balls, bonded_discs, discs_of_two_forms, bursting_ball):
         digests = []
         for threads in (1, 2):
             part, steps = case(Team(threads))

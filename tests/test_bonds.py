@@ -20,7 +20,7 @@ from distfsi.scene.description import Ball, Box, HalfSpace, Tube
 from distfsi.scene.loader import load
 from distfsi.simulation import Simulation
 from launch import ROOT
-from mpi_solid import COPPER_EOS, body, bursting_ball, digest, solid, step
+from mpi_solid import COPPER_EOS, body, bursting_ball, digest, discs_of_two_forms, solid, step
 
 RUBBER_EOS, RUBBER = LinearEos(3.25e6), Elastic(0.7e6)
 
@@ -258,7 +258,7 @@ def crack_energy(dimensions, spacing, angle=0.0, smoothing=1.3):
     """[J/m2] that a bar of steel takes when it is pulled apart, but for its motion afterwards."""
     length, width, speed = 12e-3, 4e-3, 1.0
     half = np.array([length, *[width] * (dimensions - 1)]) / 2
-    steel = (LinearEos(164e9), Elastic(80e9), None, PrincipalStress(250e6, 4e3, Scatter(10.0, 0.05, 1)))
+    steel = (LinearEos(164e9), Elastic(80e9), None, PrincipalStress(250e6, 4e3, Scatter(10.0, spacing, 0)))
     bar = body(Box(tuple(-half), tuple(half)), spacing, 7850.0, (0.0,) * dimensions, *steel)
     bar = replace(bar, lattice_angle=angle)
     far = 4 * length
@@ -267,7 +267,7 @@ def crack_energy(dimensions, spacing, angle=0.0, smoothing=1.3):
     x = c["position"][:, 0]
     c["fixed"] = np.abs(x) > 0.5 * length - (2.0 * smoothing + 0.4) * spacing
     c["velocity"][:, 0] = np.where(c["fixed"], speed * np.sign(x), 2.0 * speed * x / length)
-    c["strength_scatter"] = np.where(np.abs(x) < 1.5 * spacing, 0.8, 1.0)  # it parts where we want it to
+    c["strength_scatter"] = np.where(np.abs(x) < 1.5 * spacing, 0.8, 1.0)
     moving, time = part.totals()["kinetic"], 0.0
     while time < 35e-6:
         time += step(part)[0]
@@ -453,17 +453,18 @@ def test_a_cantilever_swings_with_timoshenkos_period():
     assert abs(fine - 0.2565) < 0.5 * abs(coarse - 0.2565)
 
 
-def test_a_restart_goes_on_to_the_same_bits():
-    part, _ = bursting_ball(Team(1))
-    for _ in range(60):
+@pytest.mark.parametrize("case", [bursting_ball, discs_of_two_forms])
+def test_a_restart_goes_on_to_the_same_bits(case):
+    part, steps = case(Team(1))
+    for _ in range(steps - 20):
         step(part)
     snapshot = {kind: {k: v.copy() for k, v in values.items()} for kind, values in part.snapshot().items()}
-    again, _ = bursting_ball(Team(1))
+    again, _ = case(Team(1))
     again.restore(snapshot)
     for each in (part, again):
         for _ in range(20):
             step(each)
-    assert (part.columns["bond_count"] == 0).any()
+    assert (part.columns["damage"] >= 1.0).any()
     assert digest(part) == digest(again)
 
 
@@ -480,6 +481,46 @@ def test_verneys_shell_stops_at_its_radius():
     inside = 0.081**2 - 0.08**2  # of the innermost of ten rings, whose area stays
     assert math.sqrt(least - inside) == pytest.approx(0.04, rel=0.01)
     assert energy(part) == pytest.approx(before, rel=1e-10)
+
+
+# ---- several forms ---------------------------------------------------------------------------------------------------
+
+
+def test_bodies_of_different_forms_meet():
+    """The energy and the momentum of all are kept, and the bonded body breaks."""
+    part, steps = discs_of_two_forms(Team(1))
+    before, whole = part.totals(), energy(part)
+    assert len(part.pieces()["piece"]) == 1
+    for _ in range(steps):
+        step(part)
+    c, after = part.columns, part.totals()
+    assert energy(part) == pytest.approx(whole, rel=1e-6)
+    change = (after["momentum"] - before["momentum"])[0]
+    assert abs(change) < 1e-12 * math.sqrt(before["mass"] * before["kinetic"])
+    assert np.array_equal(c["bond_count"] < 0, c["body"] != 1)
+    assert np.array_equal(c["piece"] < 0, c["body"] != 1)
+    assert c["plastic_strain"][c["body"] == 0].max() > 0.01
+    assert len(part.pieces()["piece"]) > 1
+    assert (c["bond_count"] == 0).any()
+
+
+@pytest.mark.parametrize("form", ["updated_lagrangian", "total_lagrangian"])
+def test_a_body_far_from_one_of_another_form_has_the_bits_that_it_has_alone(form):
+    other = {"updated_lagrangian": "total_lagrangian", "total_lagrangian": "updated_lagrangian"}[form]
+    disc = body(Ball((-0.5, 0.0), 0.3), 0.05, 8930.0, (0.0, 0.0), form=form)
+    away = body(Ball((0.7, 0.5), 0.2), 0.05, 8930.0, (0.0, 0.0), form=other)
+    alone, both = (solid(bodies, (-1.0, -1.0), (1.0, 1.0)) for bodies in ([disc], [disc, away]))
+    for part in (alone, both):
+        c = part.columns
+        c["velocity"][:, 0] = np.where(c["body"] == 0, 3000.0 * c["position"][:, 1], 0.0)
+        for _ in range(30):
+            part.prepare()
+            part.advance(2e-6)
+            part.migrate()
+    own = both.columns["body"] == 0
+    assert alone.columns["plastic_strain"].max() > 0.0
+    for name in set(alone.columns) - {"bonds"}:
+        assert np.array_equal(alone.columns[name], both.columns[name][own]), name
 
 
 def test_a_bar_bounces_from_its_mirror_image():

@@ -27,8 +27,8 @@ from side_by_side import SideBySide
 
 ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 # Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
-FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_debris", "open_voids")
-NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "drop_tension")
+FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_unbonded", "open_voids")
+NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "carry_unbonded", "keep_rates")
 FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
 CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
 CUT_CELLS += (redistribution, spreading, volumes)

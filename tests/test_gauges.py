@@ -21,7 +21,7 @@ from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.law_tables import table_of
 from distfsi.simulation import Simulation
-from distfsi.solid.solid import Solid
+from distfsi.solid.fields import cauchy_stress
 from launch import ROOT, run_ranks
 
 SOD, TUBE = ROOT / "inputs/sod.toml", ROOT / "inputs/steel_tube_full.toml"
@@ -364,8 +364,7 @@ def test_stress_of_particles(dimensions):
     """Pressure and deviator put together: the trace is -3 p, and the shear stresses stand where VTK looks for them."""
     D = dimensions
     deviator = {1: [5.0], 2: [5.0, 2.0, 7.0], 3: [5.0, 2.0, -7.0, 1.0, 2.0, 3.0]}[D]  # … xy, xz, yz
-    columns = {"deviator": np.array([deviator]), "pressure": np.array([10.0])}
-    stress = Solid._cauchy_stress(SimpleNamespace(dimensions=D), columns)[0]
+    stress = cauchy_stress(np.array([deviator]), np.array([10.0]), D)[0]
     expected = {1: [-5, -12.5, -12.5, 0, 0, 0], 2: [-5, -8, -17, 7, 0, 0], 3: [-5, -8, -17, 1, 3, 2]}[D]
     assert stress.tolist() == expected
 

@@ -155,6 +155,9 @@ def test_what_breaks_and_moves_a_body(tmp_path, faults):
     (body,) = solid.bodies
     assert solid.objective_rate == "green_naghdi"
     assert body.strength == LinearHardening(1e9, 1e6, 2e6)
+    assert solid.form_of(body) == "total_lagrangian"
+    (updated,) = load(tmp_path / "metal.toml", ("solid.bodies.one.form=updated_lagrangian",)).solid.bodies
+    assert (solid.form_of(updated), solid.form) == ("updated_lagrangian", "total_lagrangian")
     assert body.failure == JohnsonCookFailure(0.05, 3.44, -2.12, 0.0, 0.0, 1.0, 3e9, 2e4, Scatter(10.0, 2e-3, 7))
     assert (body.fixed_velocity, body.radial_velocity, body.packing) == ((10.0, 0.0), 3.0, "rings")
     one = "solid.bodies.one"

@@ -55,11 +55,18 @@ def body_of(module: str) -> Callable:
             if not kinds:
                 return context.get_dummy_value()
             parts = [called] if len(kinds) == 1 else [builder.extract_value(called, k) for k in range(len(kinds))]
-            return _from_leaves(context, builder, signature.return_type, iter(parts))
+            return _whole(context, builder, signature.return_type, iter(parts))
 
         return _numba_type(returns)(arguments), code
 
     return body
+
+
+def _whole(context, builder, kind: types.Type, leaves: Iterator[ir.Value]) -> ir.Value:
+    """A value of numba made of its leaves, tuples in it one behind the other."""
+    if not isinstance(kind, types.BaseTuple):
+        return next(leaves)
+    return context.make_tuple(builder, kind, [_whole(context, builder, part, leaves) for part in kind.types])
 
 
 class _Written:
@@ -114,11 +121,3 @@ def _leaves(context: Any, builder: Any, kind: types.Type, value: Any) -> Sequenc
     if isinstance(kind, types.Integer):
         return [context.cast(builder, value, kind, types.int64)]
     return [value]
-
-
-def _from_leaves(context: Any, builder: Any, kind: types.Type, leaves: Iterator[Any]) -> Any:
-    """The value of numba whose leaves come next."""
-    if not isinstance(kind, types.BaseTuple):
-        return next(leaves)
-    parts = [_from_leaves(context, builder, own, leaves) for own in kind.types]
-    return context.make_tuple(builder, kind, parts)

@@ -9,12 +9,19 @@ import numpy as np
 
 from distfsi.gauges import AXES, Gauge, Kept, Particles, Run, TableProbe, each_step
 from distfsi.laws.law import entry, vector
+from distfsi.laws.registry import column_units
 
 STRESSES = ("xx", "yy", "zz", "xy", "yz", "xz")
 UNITS = {
-    "position": "m", "velocity": "m/s", "density": "kg/m3", "pressure": "Pa", "energy": "J/kg", "temperature": "K",
-    "von_mises": "Pa", "stress": "Pa",
-}  # fmt: skip
+    "position": "m",
+    "velocity": "m/s",
+    "density": "kg/m3",
+    "pressure": "Pa",
+    "energy": "J/kg",
+    "von_mises": "Pa",
+    "stress": "Pa",
+    **column_units(),
+}
 
 
 @dataclass(frozen=True)

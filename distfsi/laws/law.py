@@ -258,7 +258,10 @@ class Failure(Law):
     """What breaks a solid. The first of its columns is DAMAGE.
 
     columns  what each particle remembers
+    scatter  of the strength from particle to particle (laws/solid/scatter.py), if a law has such a field
     """
+
+    scatter: Any = None
 
     folder = "laws/solid/failure"
     columns: ClassVar[tuple[Column, ...]]

@@ -6,7 +6,7 @@ import pkgutil
 from dataclasses import fields
 from importlib import import_module
 
-from distfsi.laws.law import Law
+from distfsi.laws.law import Failure, Law, SolidEos, Strength
 
 
 def word_of(law: type[Law]) -> str:
@@ -24,3 +24,9 @@ def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
 
 def _is_law_of(value: object, kind: type[Law], module: str) -> bool:
     return isinstance(value, type) and issubclass(value, kind) and value.__module__ == module
+
+
+def column_units() -> dict[str, str]:
+    """The units of what particles remember for any law of solids, but those of pure numbers."""
+    laws = (law for kind in (SolidEos, Strength, Failure) for law in laws_of(kind))
+    return {column.name: column.unit for law in laws for column in law.columns if column.unit != "1"}

@@ -82,14 +82,17 @@ def blast_on_plates(cells: int, dimensions: int, side: float, count: int, pitch:
 
 
 def bursting_ball() -> scene.Scene:
-    """Half a ball of bonded particles that flies apart at a symmetry plane: bonds are cut, there is debris."""
+    """Half a ball of bonded particles that flies apart at a symmetry plane: bonds are cut, there is debris; beside it a
+    cube without bonds."""
     failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, 2e8, 0.0, Scatter(10.0, 0.1, 1))
     eos, strength = LinearEos(3.25e9), PerfectlyPlastic(0.7e9, 2e7)
     rest, shape = (0.0,) * 3, scene.Ball((0.0,) * 3, 0.4)
     ball = scene.Body("ball", shape, 0.1, 2000.0, rest, eos, strength, None, failure, radial_velocity=300.0)
+    cube = scene.Box((0.6,) * 3, (0.8,) * 3)
+    beside = scene.Body("cube", cube, 0.1, 2000.0, rest, eos, strength, None, form="updated_lagrangian")
     free: tuple[scene.BoundaryKind, scene.BoundaryKind] = ("outflow", "outflow")
     domain = scene.Domain((-1.0, -1.0, 0.0), (1.0,) * 3, (16,) * 3, (free, free, ("symmetry", "outflow")))
-    return _endless(domain, None, scene.Solid((ball,), SMOOTHING, 1.0, 2.0))
+    return _endless(domain, None, scene.Solid((ball, beside), SMOOTHING, 1.0, 2.0))
 
 
 def _cube(

@@ -103,6 +103,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
             body.radial_velocity,
             body.packing,
             body.lattice_angle,
+            body.form,
         )
         for name, body in given.bodies.items()
     )

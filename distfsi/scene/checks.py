@@ -144,7 +144,7 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
 
 def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
     """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
-    if solid.artificial_stress > 0.0 and solid.form != "updated_lagrangian":
+    if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
         yield Fault(("solid", "artificial_stress"), 'bonds cannot clump; it needs form = "updated_lagrangian"')
     for axis, ends in enumerate(domain.boundaries):
         if "periodic" in ends:

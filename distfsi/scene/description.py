@@ -131,7 +131,7 @@ class Body:
     Particles inside `fixed` (if any) keep fixed_velocity [m/s]. To `velocity` comes radial_velocity [m/s], outward at
     the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
     `packing` (None: what suits the shape): rings along the surface or a lattice, turned by lattice_angle [rad] about a
-    cylinder's axis or the z axis.
+    cylinder's axis or the z axis. `form` (None: that of the solid).
     """
 
     name: str
@@ -147,6 +147,7 @@ class Body:
     radial_velocity: float = 0.0
     packing: Packing | None = None
     lattice_angle: float = 0.0
+    form: SolidForm | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,10 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+
+    def form_of(self, body: Body) -> SolidForm:
+        """The form of a body: its own or that of the solid."""
+        return body.form or self.form
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

@@ -146,6 +146,7 @@ class BodyInput(Table):
     lattice_angle: quantity("rad") = Field(
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
     )
+    form: description.SolidForm | None = Field(None, description="as `form` of the solid, of this body alone")
 
 
 class SolidInput(Table):

@@ -202,7 +202,7 @@ def solid_rate(scene: Scene, body: Body) -> float:
     With bonds only a shock is viscous, not all there is.
     """
     solid, c = scene.solid, solid_sound(body)
-    alpha = solid.viscosity_alpha if solid.form == "updated_lagrangian" else 0.0
+    alpha = solid.viscosity_alpha if solid.form_of(body) == "updated_lagrangian" else 0.0
     closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
     faster, volume = body.eos.behind_shock(0.5 * max(closing))
     c += faster

@@ -17,8 +17,9 @@ from distfsi.errors import Diverged
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.kernels.particles import IMAGES
 from distfsi.mesh.particles import GhostPlan, Key, ParticleExchange
+from distfsi.scene.description import Solid
 from distfsi.solid.kernels import bonds as kernels
-from distfsi.solid.kernels.records import Bodies, Bonds, Fit, Particles
+from distfsi.solid.kernels.records import NEVER_BONDED, Bodies, Bonds, Fit, Particles
 from distfsi.solid.neighbours import NeighbourSearch
 
 DRIVERS = (kernels.find_partners, kernels.weigh_bonds, kernels.fit_bonds, kernels.accept_fit)
@@ -46,16 +47,16 @@ class BondNetwork:
         exchange: ParticleExchange,
         search: NeighbourSearch,
         communicator: Communicator,
-        spacing: np.ndarray,
-        smoothing: float,
+        scene: Solid,
     ):
-        """`spacing` (bodies,) [m] of their particles; `smoothing`: smoothing length over spacing."""
-        device = exchange.device
+        """The bodies of the `scene` whose form is not the total Lagrangian one get no bonds."""
+        device, spacing = exchange.device, np.array([body.spacing for body in scene.bodies])
+        self._bonded = np.array([scene.form_of(body) == "total_lagrangian" for body in scene.bodies])
         self._kernels, self._rows, self._device = kernels, exchange.rows, device
         self._search, self._communicator, self._spacing = search, communicator, spacing
         self._dimensions = exchange.blocks.grid.dimensions
-        self.support = 2.0 * smoothing * spacing.max()
-        self.bodies = Bodies(device.array(spacing), device.array(smoothing * spacing))
+        self.support = 2.0 * scene.smoothing * spacing.max()
+        self.bodies = Bodies(device.array(spacing), device.array(scene.smoothing * spacing))
         self.continued = device.zeros(len(spacing), np.int64)
         self._ids: np.ndarray | None = None  # for whose columns the requested keys are
         self._requested = np.empty(0, dtype=np.int64)
@@ -72,15 +73,16 @@ class BondNetwork:
         for begin, near in chunks_of(table):
             rows = slice(begin, begin + len(near))
             found = np.arange(table.shape[1]) < count[rows, None]
-            near = np.where(found, near, 0)
-            bonded = found & (side[near] == c["body"].astype(np.int64)[rows, None])
+            near, body = np.where(found, near, 0), c["body"][rows, None].astype(np.int64)
+            bonded = found & (side[near] == body) & self._bonded[body]
             keys = np.sort(np.where(bonded, key[near], NONE), axis=1)
             bonds.append(keys[:, : bonded.sum(axis=1).max(initial=1)])
         width = int(self._communicator.maximum(np.array([max((b.shape[1] for b in bonds), default=1)]))[0])
         padded = [np.pad(b, ((0, 0), (0, width - b.shape[1])), constant_values=NONE) for b in bonds]
         keys = np.concatenate([np.empty((0, width), dtype=np.int64), *padded])
         c["bonds"] = np.where(keys == NONE, -1, keys)
-        c["bond_count"] = np.count_nonzero(c["bonds"] >= 0, axis=1)
+        count = np.count_nonzero(c["bonds"] >= 0, axis=1)
+        c["bond_count"] = np.where(self._bonded[c["body"]], count, NEVER_BONDED)
 
     def _neighbours(
         self, c: Columns, exchange: ParticleExchange

@@ -9,8 +9,9 @@ import numpy as np
 
 from distfsi.device.interface import Columns
 from distfsi.mesh.rows import Rows
+from distfsi.narrowing import present
 from distfsi.solid.kernels import contact as kernels
-from distfsi.solid.kernels.records import DEBRIS, SMOOTHING, Contacts, Neighbours, Particles, SearchMemory
+from distfsi.solid.kernels.records import SMOOTHING, UNBONDED, Contacts, Neighbours, Particles, SearchMemory
 from distfsi.solid.neighbours import Near, NeighbourSearch
 
 DRIVERS = (
@@ -61,7 +62,7 @@ class Contact:
         self._chosen = rows
         self._contacts = Contacts(near.position, near.state, reference, size, rupture_length, side)
 
-    def _still_valid(self, number: int, known: tuple) -> bool:
+    def _still_valid(self, number: int, known: tuple[Any, ...]) -> bool:
         if self._last is None or self._last.identity.shape[0] != number:
             return False
         mark = self._device.empty(number, np.int8)
@@ -71,7 +72,7 @@ class Contact:
     def _candidates(self, c: Columns, near: Near, device_rows: Any, size: Any, payload: Any) -> Neighbours:
         """Those of the particles `device_rows` that may soon touch each of the own among them.
 
-        Two particles of debris act on each other otherwise.
+        Two particles without bonds act on each other otherwise.
         """
         device, rows = self._device, self._device.download(device_rows)
         position, key, state, size, payload = (
@@ -79,17 +80,17 @@ class Contact:
             for array in (near.position, near.plan.key.device, near.state, size, payload)
         )
         # A search in which a particle reaches as far as it may soon touch.
-        state, debris = device.download(state).copy(), device.download(payload)[:, DEBRIS]
+        state, unbonded = device.download(state).copy(), device.download(payload)[:, UNBONDED]
         reach = (1.0 + SKIN) * device.download(size)
         state[:, SMOOTHING] = 0.5 * reach
         own = int(np.searchsorted(rows, near.own))
         cells = reach.max(initial=np.finfo(float).tiny)
         near_each_other = self._search.find(own, Particles(position, device.array(state)), key, cells)
-        # Pairs without a bond, of which at most one is debris.
+        # Pairs without a bond, of which one has bonds.
         found, key, bonds = device.download(near_each_other.table), device.download(key), c["bonds"]
         first, index = np.nonzero(np.arange(found.shape[1]) < device.download(near_each_other.count)[:, None])
         second = found[first, index]
-        apart = debris[first] * debris[second] == 0
+        apart = unbonded[first] * unbonded[second] == 0
         first, second = first[apart], second[apart]
         free = ~(bonds[rows[first]] == key[second][:, None]).any(axis=1)
         first, second = first[free], second[free]
@@ -110,5 +111,5 @@ class Contact:
         self._run(self._kernels.heat_contacts, mass, dt, motion, energy)
 
     def _run(self, kernel: Any, *arguments: Any) -> None:
-        pairs = (self._chosen, self._neighbours, self._contacts)
-        self._device.run(kernel, self._neighbours.count.shape[0], *pairs, *arguments)
+        neighbours = present(self._neighbours)
+        self._device.run(kernel, neighbours.count.shape[0], self._chosen, neighbours, self._contacts, *arguments)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from distfsi.solid.kernels.records import LawTables, RestState
 SCATTER = Column("strength_scatter", "1", "factor of the strength of the particle", initial=1.0, written=False)
 PRESSURE = Column("pressure", "Pa", "pressure that is carried")
 MINIMUM_MODULUS = 0.1  # of the bulk modulus at rest, which expanded hot material keeps
+
+
+SolidLaw = type[SolidEos] | type[Strength] | type[Failure]
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class Material:
         return cls(type(body.eos), type(body.strength), type(failure) if failure else None, scattered)
 
     @property
-    def laws(self) -> dict[str, type[Law]]:
+    def laws(self) -> dict[str, SolidLaw]:
         """The laws by their kind: eos, strength and, if the material can fail, failure."""
         return {name: getattr(self, name) for name in LawTables._fields if getattr(self, name)}
 
@@ -52,18 +55,18 @@ class Material:
         return tuple(column for law in self.laws.values() for column in law.columns)
 
     @property
-    def memory(self) -> tuple[type[NamedTuple], ...]:
+    def memory(self) -> tuple[type[Any], ...]:
         """Records of what is remembered for each of the laws, in the order of the kernel's arguments."""
         return tuple(self._memory(name) for name in LawTables._fields)
 
-    def _memory(self, name: str) -> type[NamedTuple]:
+    def _memory(self, name: str) -> type[Any]:
         columns = self.laws[name].columns if name in self.laws else ()
-        return NamedTuple(f"{name.capitalize()}Memory", [(column.name, float) for column in columns])
+        return cast(type[Any], NamedTuple(f"{name.capitalize()}Memory", [(column.name, float) for column in columns]))
 
     @property
     def constants(self) -> dict[str, object]:
         """What the kernels of this material are specialised for, beside what all are."""
-        sizes = {}
+        sizes: dict[str, object] = {}
         for name in LawTables._fields:
             law = self.laws.get(name)
             sizes[f"{name.upper()}_FIELDS"] = len(fields(law)) if law else 0

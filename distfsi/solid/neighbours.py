@@ -12,10 +12,12 @@ import numpy as np
 from distfsi.device.interface import Device
 from distfsi.mesh import search
 from distfsi.mesh.kernels import rows as row_kernels
-from distfsi.mesh.particles import GhostPlan, Parity
+from distfsi.mesh.particles import GhostPlan
 from distfsi.mesh.rows import Rows
 from distfsi.solid.kernels import neighbours as kernels
 from distfsi.solid.kernels.records import Neighbours, Particles
+
+Components = tuple[tuple[int, ...], ...]  # of each component the axes whose reflection changes its sign: a parity
 
 DRIVERS = (*search.DRIVERS, kernels.find_neighbours, kernels.scatter_neighbours, row_kernels.find_largest)
 
@@ -50,18 +52,18 @@ class Near:
         return Particles(self.position, self.state)
 
     @property
-    def vector(self) -> Parity:
+    def vector(self) -> Components:
         """How the components of a vector change in an image."""
         return tuple((a,) for a in range(self.position.shape[1]))
 
     @property
-    def matrix(self) -> Parity:
+    def matrix(self) -> Components:
         """How the components of a matrix, row by row, change in an image."""
         axes = range(self.position.shape[1])
         return tuple((a, b) for a in axes for b in axes)
 
     @property
-    def tensor(self) -> Parity:
+    def tensor(self) -> Components:
         """How the components of a symmetric tensor change in an image."""
         axes = range(self.position.shape[1])
         return tuple((a, a) for a in axes) + tuple((a, b) for a in axes for b in axes if a < b)
@@ -91,10 +93,10 @@ class NeighbourSearch:
                 self._table = self._device.empty((own, self._width), np.int32)
             found = Neighbours(self._table, count)
             self._device.run(self._kernels.find_neighbours, own, *near, found)
-            most = self._rows.largest(count, 0)
-            if most <= self._width:
+            maximum = self._rows.largest(count, 0)
+            if maximum <= self._width:
                 return found
-            self._width = int(1.2 * most)
+            self._width = int(1.2 * maximum)
 
     def find_among(self, rows: Any, own: int, particles: Particles, key: Any, size: float) -> Neighbours:
         """As find(), of the particles `rows` (ascending, on the device) alone, of which the first are among the `own`;

@@ -17,8 +17,8 @@ def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, device: Device, co
     different labels on different ranks, these name one piece.
     """
     local = _smallest(id, links)
-    (told,) = plan.exchange([(device.array(local[: plan.own].astype(float)), ((),))])
-    same = np.stack([local, device.download(told)[: len(id)].astype(np.int64)], axis=1)
+    (labels,) = plan.exchange([(device.array(local[: plan.own].astype(float)), ((),))])
+    same = np.stack([local, device.download(labels)[: len(id)].astype(np.int64)], axis=1)
     same = communicator.concatenate(np.unique(same[same[:, 0] != same[:, 1]], axis=0))
     names, ends = np.unique(same, return_inverse=True)
     merged = _smallest(names, ends.reshape(-1, 2).T)
@@ -28,15 +28,15 @@ def label(id: np.ndarray, links: np.ndarray, plan: GhostPlan, device: Device, co
 
 
 def _smallest(names: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """The smallest of the `names` (n,) that each of them is linked with; `links` (2, m) are places in `names`."""
+    """The smallest of the `names` (n,) that each of them is linked with; `links` (2, m) index the `names`."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     n = len(names)
     _, component = connected_components(coo_array((np.ones(links.shape[1], dtype=bool), tuple(links)), (n, n)), False)
-    least = np.full(n, np.iinfo(np.int64).max)
-    np.minimum.at(least, component, names)
-    return least[component]
+    smallest = np.full(n, np.iinfo(np.int64).max)
+    np.minimum.at(smallest, component, names)
+    return smallest[component]
 
 
 def table(columns: dict[str, np.ndarray], block: np.ndarray, blocks: Blocks) -> dict[str, np.ndarray]:
@@ -46,15 +46,15 @@ def table(columns: dict[str, np.ndarray], block: np.ndarray, blocks: Blocks) -> 
     extent along each axis). `block` (own,) is the local block of each particle.
     """
     c, D = columns, columns["position"].shape[1]
-    most = c["piece"].max(initial=0) + 1
-    groups, group = np.unique(block * most + c["piece"], return_inverse=True)
+    stride = c["piece"].max(initial=0) + 1
+    groups, group = np.unique(block * stride + c["piece"], return_inverse=True)
     mass = c["mass"][:, None]
     amounts = np.hstack([np.ones_like(mass), mass, mass * c["position"], mass * c["velocity"]])
     sums = np.zeros((len(groups), amounts.shape[1]))
     np.add.at(sums, group, amounts)
     ends = np.full((len(groups), 2 * D), -np.inf)
     np.maximum.at(ends, group, np.hstack([c["position"], -c["position"]]))
-    names = blocks.communicator.concatenate(groups % most)
+    names = blocks.communicator.concatenate(groups % stride)
     everything = blocks.communicator.concatenate(np.hstack([sums, ends]))
     labels, piece = np.unique(names, return_inverse=True)
     total, extent = np.zeros((len(labels), sums.shape[1])), np.full((len(labels), 2 * D), -np.inf)

@@ -34,7 +34,7 @@ class SolidForm(Protocol):
 
     def ghost_payload(self, columns: Columns, /) -> list[Any]:
         """What ghosts and images must bring besides the state: pairs of an array (own, k) of the device and its
-        parities, or "position". It comes back, of `count` particles, in `Near.ghost_payload`."""
+        parities, or "position". It comes back, of `count` particles, in `Near.payload`."""
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any, /) -> None:
         """Collective. Add the `acceleration` (own, D) [m/s2] of the forces between particles to none, and write the
@@ -43,6 +43,9 @@ class SolidForm(Protocol):
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any, /) -> None:
         """Collective, after accelerate(). Advance the energy, and what else the form keeps of the deformation, by `dt`
         [s] with the old and the new `velocity` (count, D) [m/s], and write the velocity gradient (own, D D) [1/s]."""
+
+    def resume(self, /) -> None:
+        """The columns are those of a restart from now on."""
 
     def label_pieces(self, columns: Columns, exchange: ParticleExchange, /) -> None:
         """Collective. Bring the labels of the pieces that hold together up to date, if the form knows pieces."""

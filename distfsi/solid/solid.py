@@ -1,4 +1,4 @@
-"""The solid: smoothed particles, their motion and their books (paper, Sec. 2.1 and Appendix A).
+"""The solid: smoothed particles, their motion and their budget (paper, Sec. 2.1 and Appendix A).
 
 How particles act on each other is a matter of the solid's form: updated.py, total_lagrangian.py. A step needs
 three or four messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the
@@ -22,16 +22,16 @@ from distfsi.mesh.kernels import particles as particle_kernels
 from distfsi.mesh.kernels import rows as row_kernels
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
+from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.scene.packing import initial_velocity, pack
-from distfsi.scene.shapes import contains
-from distfsi.solid import neighbours, pieces, total_lagrangian, updated
+from distfsi.solid import fields, neighbours, pieces, total_lagrangian, updated
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.kernels import motion
 from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.packed import packed
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.total_lagrangian import TotalLagrangian
 from distfsi.solid.updated import UpdatedLagrangian
@@ -48,7 +48,6 @@ DRIVERS = (
     *updated.DRIVERS,
     *total_lagrangian.DRIVERS,
 )
-SHEARS = ((), (), (3,), (3, 5, 4))  # where the shear stresses xy, xz, yz stand in xx, yy, zz, xy, yz, xz
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
@@ -72,10 +71,11 @@ class Solid:
     def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
         self.blocks, self.communicator, self.team = blocks, communicator, team
         self.dimensions = D = scene.domain.dimensions
-        self.materials = Materials(scene.solid, D)
+        self._scene = solid = present(scene.solid)
+        self.materials = Materials(solid, D)
         self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
         self.body_force = BodyForce(scene.sources, D)
-        constants = self._constants(scene)
+        constants = self._constants()
         self.kernels = team.build(DRIVERS, constants)
         self._points = MaterialGroups(self.materials, team, constants)
         self._von_mises = plain(von_mises, constants)
@@ -85,7 +85,7 @@ class Solid:
         self._boundary_impulse = np.zeros((blocks.local_count, D))
         self._gravity_work = np.zeros(blocks.local_count)
         self.work = np.zeros(blocks.local_count)
-        self.given = np.zeros((blocks.local_count, len(scene.solid.bodies), D))
+        self.given = np.zeros((blocks.local_count, len(solid.bodies), D))
         # What prepare() finds.
         self._near: Near | None = None
         self._acceleration, self._limits = team.empty((0, D)), team.empty((0, len(LIMITS)))
@@ -103,51 +103,33 @@ class Solid:
         self._points.deform(self.columns, 0.0, team.zeros((self.count, D**2)))
         self.form.bind(self.columns, self.exchange)
 
-    def _constants(self, scene: Scene) -> dict[str, object]:
+    def _constants(self) -> dict[str, object]:
         """What the kernels are specialised for."""
-        D = self.dimensions
+        solid, D = self._scene, self.dimensions
         return {
             "DIMENSIONS": D,
             "COMPONENTS": D * (D + 1) // 2,
             "BODY_FORCE": self.body_force.acceleration,
-            "VISCOSITY_ALPHA": scene.solid.viscosity_alpha,
-            "VISCOSITY_BETA": scene.solid.viscosity_beta,
-            "SMOOTHING_RATIO": scene.solid.smoothing,
-            "ARTIFICIAL_STRESS": scene.solid.artificial_stress,
-            "ZERO_ENERGY": scene.solid.zero_energy,
+            "VISCOSITY_ALPHA": solid.viscosity_alpha,
+            "VISCOSITY_BETA": solid.viscosity_beta,
+            "SMOOTHING_RATIO": solid.smoothing,
+            "ARTIFICIAL_STRESS": solid.artificial_stress,
+            "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
 
     def _form(self, scene: Scene) -> SolidForm:
-        search = NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
-        if scene.solid.form == "total_lagrangian":
-            given = (self.communicator, scene.solid, self._points, self.dimensions)
+        solid, search = self._scene, NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
+        if any(solid.form_of(body) == "total_lagrangian" for body in solid.bodies):
+            given = (self.communicator, solid, self._points, self.dimensions)
             return TotalLagrangian(self.kernels, self.exchange, search, *given)
-        repels = scene.solid.artificial_stress > 0.0
+        repels = solid.artificial_stress > 0.0
         return UpdatedLagrangian(self.kernels, self.team, search, self.dimensions, repels)
 
     def _own_particles(self, scene: Scene) -> dict[str, np.ndarray]:
-        """Pack the bodies; the columns of the particles in this rank's blocks."""
-        columns = [self._packed(scene, b) for b in range(len(scene.solid.bodies))]
-        columns = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-        columns["id"] = np.arange(len(columns["body"]))
+        """The columns of the particles in this rank's blocks."""
+        columns = packed(scene)
         mine = self.blocks.owners[self.blocks.block_of(columns["position"])] == self.communicator.rank
         return {name: column[mine] for name, column in columns.items()}
-
-    def _packed(self, scene: Scene, b: int) -> dict[str, np.ndarray]:
-        body = scene.solid.bodies[b]
-        position, volume = pack(body, scene.domain.lower, scene.domain.upper)
-        n = len(position)
-        fixed = np.zeros(n, dtype=bool) if body.fixed is None else contains(body.fixed, position)
-        return {
-            "body": np.full(n, b),
-            "position": position,
-            "velocity": np.where(fixed[:, None], body.fixed_velocity or 0.0, initial_velocity(body, position)),
-            "fixed": fixed,
-            "mass": body.density * volume,
-            "density": np.full(n, body.density),
-            "h": np.full(n, scene.solid.smoothing * body.spacing),
-            "energy": np.zeros(n),
-        }
 
     # ---- the step ---------------------------------------------------------------------------------------------------
 
@@ -159,9 +141,10 @@ class Solid:
         there are such. Raises Diverged on all ranks when a smoothing length is not finite.
         """
         c, device, own = self.columns, self.team, self.count
-        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
-        support, *flags = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
-        support *= 2.0
+        (h,) = c.read("h")
+        largest = self.exchange.rows.largest(h, 0.0)
+        maxima = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
+        support, flags = 2.0 * maxima[0], maxima[1:]
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
         state, parity = device.empty((own, VELOCITY + self.dimensions)), ((),) * VELOCITY
@@ -186,7 +169,7 @@ class Solid:
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
-        dt, index = rows.minimum(rows.taken(self._limits, self._groups.rows).reshape(-1))
+        dt, index = rows.minimum(rows.taken(self._limits, present(self._groups).rows).reshape(-1))
         particle, cause = divmod(index, len(LIMITS))
         dt, id = float(dt), self.columns["id"][self._order[particle]]
         return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
@@ -201,20 +184,20 @@ class Solid:
 
     def kick(self, dt: float) -> None:
         """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
-        c, booked = self.columns, self.team.empty((self.count, 1 + self.dimensions))
-        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), booked)
+        c, budget = self.columns, self.team.empty((self.count, 1 + self.dimensions))
+        given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), budget)
         self._run(self.kernels.kick, dt, *given)
-        books = self._per_body(booked).sum(axis=1)
-        self._gravity_work += books[:, motion.WORK]
-        self._boundary_impulse += books[:, motion.IMPULSE :]
+        sums = self._per_body(budget).sum(axis=1)
+        self._gravity_work += sums[:, motion.WORK]
+        self._boundary_impulse += sums[:, motion.IMPULSE :]
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
         c, device, D = self.columns, self.team, self.dimensions
         (velocity,) = c.read("velocity")
-        (around,) = self._near.plan.exchange([(velocity, self._vector)])
+        (around,) = self.around.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
-        self.form.strain(c, self._near, dt, around, gradient)
+        self.form.strain(c, self.around, dt, around, gradient)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
@@ -229,13 +212,13 @@ class Solid:
         mean of before and after, exceeds the one that carried it.
         """
         c, device, D = self.columns, self.team, self.dimensions
-        excess, booked = device.empty((self.count, D)), device.empty((self.count, 2 + D))
-        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, booked)
+        excess, budget = device.empty((self.count, D)), device.empty((self.count, 2 + D))
+        given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, budget)
         self._run(self.kernels.apply_impulse, impulse, *given)
-        books = self._per_body(booked).sum(axis=1)
-        self.work, self.given = books[:, 0], self._per_body(impulse)
-        self._gravity_work += books[:, 1]
-        self._boundary_impulse += books[:, 2:]
+        sums = self._per_body(budget).sum(axis=1)
+        self.work, self.given = sums[:, 0], self._per_body(impulse)
+        self._gravity_work += sums[:, 1]
+        self._boundary_impulse += sums[:, 2:]
         return excess
 
     def migrate(self) -> None:
@@ -274,12 +257,12 @@ class Solid:
 
     def _per_body(self, values: Any) -> np.ndarray:
         """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
-        return self._groups.sums(values).reshape(*self.given.shape[:2], values.shape[1])
+        return present(self._groups).sums(values).reshape(*self.given.shape[:2], values.shape[1])
 
     @property
     def around(self) -> Near:
         """Own particles, ghosts and images as of prepare()."""
-        return self._near
+        return present(self._near)
 
     def check(self, time: float) -> None:
         """Raise Diverged, naming the particle, if one of this rank has no valid state at `time` [s]."""
@@ -315,8 +298,9 @@ class Solid:
         self.label_pieces()
         if "piece" not in self.columns:
             return None
-        c = self._sorted("piece", "mass", "position", "velocity")
-        return pieces.table(c, self._block[self._order], self.blocks)
+        c, bonded = self._sorted("piece", "mass", "position", "velocity"), self.columns["piece"][self._order] >= 0
+        c = {name: column[bonded] for name, column in c.items()}
+        return pieces.table(c, self._block[self._order][bonded], self.blocks)
 
     def label_pieces(self) -> None:
         """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
@@ -345,28 +329,14 @@ class Solid:
             self.columns[name] = column
         self._home = None
         self.migrate()
+        self.form.resume()
         self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """This rank's particles for a field file: position and velocity (n, 3), the scalars (n,), and the stress (n, 6)
-        with the components xx, yy, zz, xy, yz, xz. `chosen`: the rows wanted, by default all, by block, body and id."""
-        D, rows = self.dimensions, self._order if chosen is None else chosen
+        """This rank's particles for a field file (solid/fields.py); `chosen`: the rows wanted, by default all, by
+        block, body and id."""
+        rows = self._order if chosen is None else chosen
         c = {name: column[rows] for name, column in self.columns.items()}
-        vectors = {name: np.pad(c[name], ((0, 0), (0, 3 - D))) for name in ("position", "velocity")}
-        names = ["density", "energy", "id", "body", *(m.name for m in self.materials.columns if m.written)]
-        names += [name for name in ("piece", *self._shown) if name in c]
-        invariant = {"von_mises": self._von_mises(c["deviator"].T), "stress": self._cauchy_stress(c)}
-        return vectors | {name: c[name] for name in names} | invariant
-
-    def _cauchy_stress(self, columns: dict[str, np.ndarray]) -> np.ndarray:
-        """(n, 6) stress [Pa], tension positive; the normal stresses out of the plane share what makes the deviator's
-        trace vanish."""
-        deviator, D = columns["deviator"], self.dimensions
-        stress = np.zeros((len(deviator), 6))
-        stress[:, :D] = deviator[:, :D]
-        stress[:, D:3] = -deviator[:, :D].sum(axis=1, keepdims=True) / max(3 - D, 1)
-        stress[:, :3] -= columns["pressure"][:, None]
-        for column, component in zip(SHEARS[D], deviator[:, D:].T, strict=True):
-            stress[:, column] = component
-        return stress
+        written = fields.outputs(c, self.materials.columns, self._shown)
+        return written | {"von_mises": self._von_mises(c["deviator"].T)}

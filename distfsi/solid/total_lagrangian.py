@@ -1,7 +1,7 @@
 """The total Lagrangian form: bonds between the neighbours of the reference state, contact, and debris.
 
 A particle whose bonds are gone is debris: from then on the updated Lagrangian form moves it among other debris, with
-the state it had.
+the state it had. So it moves bodies beside the bonded ones whose form it is; what has bonds touches what has none.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ import numpy as np
 
 from distfsi.device.interface import Columns
 from distfsi.mesh.communicator import Communicator
-from distfsi.mesh.particles import IMAGES, Parity, ParticleExchange
+from distfsi.mesh.kernels.particles import IMAGES
+from distfsi.mesh.particles import Parity, ParticleExchange
+from distfsi.narrowing import present
 from distfsi.scene.description import Solid
 from distfsi.solid import bonds, contact, pieces
 from distfsi.solid.bonds import BondNetwork, chunks_of
@@ -22,6 +24,7 @@ from distfsi.solid.kernels import bonds as kernels
 from distfsi.solid.kernels import cracks, motion
 from distfsi.solid.kernels.records import (
     CRACK,
+    NEVER_BONDED,
     BondedMaterial,
     BondedPoint,
     Bonds,
@@ -32,14 +35,14 @@ from distfsi.solid.kernels.records import (
 )
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.neighbours import Near, NeighbourSearch
-from distfsi.solid.updated import UpdatedLagrangian
+from distfsi.solid.updated import Carried, UpdatedLagrangian
 
 DRIVERS = (
     *bonds.DRIVERS,
     cracks.mark_breaking,
     cracks.mark_cut,
     cracks.mark_damaged,
-    cracks.mark_debris,
+    cracks.mark_unbonded,
     cracks.spread_damage,
     cracks.find_cracks,
     cracks.cut_bonds,
@@ -49,6 +52,8 @@ DRIVERS = (
     kernels.strain_bonds,
     kernels.limit_bonds,
     motion.pack_motion,
+    cracks.carry_unbonded,
+    cracks.keep_rates,
     *contact.DRIVERS,
 )
 
@@ -68,6 +73,8 @@ class TotalLagrangian:
     crack                (n, D) vector, in the reference state, to the plane of the crack beside it [m]; 0: none
     detaching            (n,) 1 when the particle leaves its bonds in the next step
     exposed              (n,) 1 when it lies at a surface
+    velocity_gradient    (n, D D) that of the last step [1/s], of particles of bodies in the updated form, if there are
+                         such; their bond_count is NEVER_BONDED and their piece -1
     """
 
     def __init__(
@@ -82,9 +89,9 @@ class TotalLagrangian:
     ):
         self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
         self._communicator, self._materials, self._dimensions = communicator, materials, dimensions
-        spacing = np.array([body.spacing for body in scene.bodies])
-        self._network = BondNetwork(kernels, exchange, search, communicator, spacing, scene.smoothing)
-        self._debris = UpdatedLagrangian(kernels, self._device, search, dimensions)
+        self._network = BondNetwork(kernels, exchange, search, communicator, scene)
+        self._mixed = any(scene.form_of(body) != "total_lagrangian" for body in scene.bodies)
+        self._unbonded = UpdatedLagrangian(kernels, self._device, search, dimensions, scene.artificial_stress > 0.0)
         self._contact = Contact(kernels, self._rows, search, dimensions)
         self._cut_since_labelled = True
         self._bonds: Bonds | None = None  # of the last accelerate(), and the packed state of its bonds
@@ -100,8 +107,11 @@ class TotalLagrangian:
         c["viscous_pressure"], c["void"], c["neighbourhood_damage"] = np.zeros(n), np.zeros(n), np.zeros(n)
         c["crack"], c["rupture_length"] = np.zeros((n, D)), np.full(n, network.support)
         c["detaching"] = np.zeros(n, dtype=np.int64)
+        if self._mixed:
+            self._unbonded.bind(c, exchange)
         # Fit the bonds to no displacement.
-        plan = exchange.ghosts(*c.read("position"), c["id"], network.support, self.requested_keys(c))
+        (position,) = c.read("position")
+        plan = exchange.ghosts(position, c["id"], network.support, self.requested_keys(c))
         volume = device.array(np.ascontiguousarray(c["volume"][:, None]))
         reference, volume = plan.exchange([(*c.read("reference"), "position"), (volume, ((),))])
         bonds = network.find(c, plan.key, reference, volume)
@@ -112,20 +122,26 @@ class TotalLagrangian:
         c["exposed"] = (device.download(moments)[:, 0] < kernels.EXPOSED_BELOW).astype(np.int64)
         self.label_pieces(c, exchange)
 
+    def resume(self) -> None:
+        """Bonds may have been cut since the pieces were labelled."""
+        self._cut_since_labelled = True
+
     def label_pieces(self, c: Columns, exchange: ParticleExchange) -> None:
         """Collective. Bring the labels of the pieces up to date."""
         if self._communicator.maximum(np.array([self._cut_since_labelled]))[0] == 0.0:
             return
         self._cut_since_labelled = False
-        plan = exchange.ghosts(*c.read("position"), c["id"], 0.0, self.requested_keys(c))
+        (position,) = c.read("position")
+        plan = exchange.ghosts(position, c["id"], 0.0, self.requested_keys(c))
         id = plan.key.host[plan.key.host % IMAGES == 0] // IMAGES
         order = np.argsort(id, kind="stable")
-        pairs = [np.empty((2, 0), dtype=np.int64)]
+        links = [np.empty((2, 0), dtype=np.int64)]
         for begin, partners in chunks_of(c["bonds"]):
             first, index = np.nonzero(partners >= 0)
             second = order[np.searchsorted(id, partners[first, index] // IMAGES, sorter=order)]
-            pairs.append(np.stack([begin + first, second])[:, begin + first < second])  # each bond once
-        c["piece"] = pieces.label(id, np.concatenate(pairs, axis=1), plan, self._device, self._communicator)
+            links.append(np.stack([begin + first, second])[:, begin + first < second])  # each bond once
+        found = pieces.label(id, np.concatenate(links, axis=1), plan, self._device, self._communicator)
+        c["piece"] = np.where(c["bond_count"] == NEVER_BONDED, -1, found)
 
     # ---- what ghosts must know ---------------------------------------------------------------------------------------
 
@@ -157,7 +173,8 @@ class TotalLagrangian:
         self._run(n, "pack_bond_state", self._materials.rest, self._material(c), *shape, bond_state)
         known = (*c.read("volume", "body"), cohesion, *c.read("deformation"), self._damage(c))
         self._run(n, "pack_payload", *known, payload)
-        return [(*c.read("reference"), "position"), (bond_state, parity), (payload, (*((),) * CRACK, *vector))]
+        given = [(*c.read("reference"), "position"), (bond_state, parity), (payload, (*((),) * CRACK, *vector))]
+        return given + (self._unbonded.ghost_payload(c) if self._mixed else [])
 
     def _damage(self, c: Columns) -> Any:
         return c.read("damage")[0] if "damage" in c else self._device.empty(0)
@@ -172,17 +189,19 @@ class TotalLagrangian:
     def accelerate(self, c: Columns, near: Near, acceleration: Any, limits: Any) -> None:
         """Collective. Cut bonds that have failed; add the `acceleration` (own, D) of all forces to none, and write the
         time steps (own, 2) that they allow."""
-        reference, bond_state, payload = near.payload
+        reference, bond_state, payload, *rates = near.payload
         bonds = self._network.find(c, near.plan.key, reference, payload)
         damaged, breaking = near.flags
         if damaged:
             self._run(near.own, "spread_damage", bonds, payload, *c.write("neighbourhood_damage"))
         if breaking:
             self._cut(c, near, bonds)
-            _, bond_state, payload = near.plan.exchange(self.ghost_payload(c))
+            _, bond_state, payload, *rates = near.plan.exchange(self.ghost_payload(c))
+        if breaking or self._mixed:
             mark = self._device.empty(near.plan.count, np.int8)
-            self._run(near.plan.count, "mark_debris", payload, mark)
-            self._debris.accelerate_debris(c, near, self._rows.marked(mark)[1], acceleration, limits)
+            self._run(near.plan.count, "mark_unbonded", payload, mark)
+            carried = self._carried(c, near, rates)
+            self._unbonded.accelerate_among(near, self._rows.marked(mark)[1], carried, acceleration, limits)
         volume, mass = c.read("volume", "mass")
         self._run(near.own, "accelerate_bonds", bonds, bond_state, volume, mass, acceleration)
         self._contact.find(c, near, reference, payload, self._network.continued)
@@ -191,11 +210,19 @@ class TotalLagrangian:
         self._run(near.own, "limit_bonds", bonds.count, self._network.bodies, *given)
         self._bonds, self._bond_state = bonds, bond_state
 
+    def _carried(self, c: Columns, near: Near, rates: list[Any]) -> Carried:
+        """What particles without bonds act on each other with; `rates`: their velocity gradients if any has one."""
+        D, (pressure, deviator) = self._dimensions, c.read("pressure", "deviator")
+        found = rates[0] if rates else self._device.zeros((near.plan.count, D * D))
+        carried = Carried(found, self._device.empty(near.own), self._device.empty(deviator.shape))
+        self._run(near.own, "carry_unbonded", *c.read("bond_count"), pressure, deviator, *carried[1:])
+        return carried
+
     def _cut(self, c: Columns, near: Near, bonds: Bonds) -> None:
         """Cut bonds and fit what is left; a particle that too few bonds hold detaches in the next step."""
         lost, mark = self._device.empty(near.own, np.int64), self._device.empty(near.own, np.int8)
         sizes = (self._network.bodies, *c.read("body"))
-        reference, bond_state, payload = near.payload
+        reference, bond_state, payload, *_ = near.payload
         # Planes of cracks beside the particles that are damaged.
         if "damage" in c:
             known = (*c.read("deformation", "damage"), payload, *c.write("crack"))
@@ -220,8 +247,10 @@ class TotalLagrangian:
         """Advance energy and deformation by `dt` [s] with the old and the new `velocity` (count, D), and write the
         velocity gradient (own, D D) [1/s]; after accelerate()."""
         breaking = near.flags[1]
-        if breaking:
-            self._debris.strain_debris(c, near, dt, velocity, gradient)
+        if breaking or self._mixed:
+            self._unbonded.strain_among(c, near, dt, velocity, gradient)
+        if self._mixed:
+            self._run(near.own, "keep_rates", *c.read("bond_count"), gradient, *c.write("velocity_gradient"))
         motion = self._device.empty((near.plan.count, 2 * self._dimensions))
         self._run(near.plan.count, "pack_motion", near.state, velocity, motion)
         point = BondedPoint(*c.read(*BondedPoint._fields))
@@ -229,9 +258,10 @@ class TotalLagrangian:
         energy, viscous_pressure, detaching = c.write("energy", "viscous_pressure", "detaching")
         result = StrainResult(energy, viscous_pressure, gradient, detaching)
         self._run(near.own, "strain_bonds", dt, self._bonds, self._bond_state, motion, point, fit, result)
-        self._contact.heat(*c.read("mass"), dt, motion, *c.write("energy"))
+        (mass,), (energy,) = c.read("mass"), c.write("energy")
+        self._contact.heat(mass, dt, motion, energy)
         if breaking and dt > 0.0:
-            self._materials.open_voids(c, dt, self._bonds.count, gradient)
+            self._materials.open_voids(c, dt, present(self._bonds).count, gradient)
 
     def _run(self, count: int, kernel: str, *arguments: Any) -> None:
         self._device.run(getattr(self._kernels, kernel), count, *arguments)

@@ -13,7 +13,7 @@ from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.kernels.records import Interaction, Neighbours
 from distfsi.solid.neighbours import Near, NeighbourSearch
 
-DRIVERS = (kernels.correct_gradients, kernels.accelerate_pairs, kernels.strain_pairs, kernels.drop_tension)
+DRIVERS = (kernels.correct_gradients, kernels.accelerate_pairs, kernels.strain_pairs)
 
 
 class Carried(NamedTuple):
@@ -43,6 +43,9 @@ class UpdatedLagrangian:
         """Add the column."""
         columns["velocity_gradient"] = np.zeros((len(columns["id"]), self._dimensions**2))
 
+    def resume(self) -> None:
+        """Nothing else is kept."""
+
     def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
         """There are no bonds that make pieces."""
 
@@ -66,24 +69,17 @@ class UpdatedLagrangian:
         carried = Carried(rates, *columns.read("pressure", "deviator"))
         self._act(near, neighbours, carried, acceleration, limits)
 
-    def accelerate_debris(self, columns: Columns, near: Near, debris: Any, acceleration: Any, limits: Any) -> None:
-        """As accelerate(), of the particles `debris` (ascending rows) alone, which carry nothing but pressure, and
-        whose every approach is damped."""
-        among = (debris, near.own, near.particles, near.plan.key.device, near.support)
-        neighbours = self._search.find_among(*among)
-        pressure, deviator = columns.read("pressure", "deviator")
-        compression = self._device.empty(near.own)
-        self._device.run(self._kernels.drop_tension, near.own, pressure, compression)
-        rates = self._device.zeros((near.plan.count, self._dimensions**2))
-        carried = Carried(rates, compression, self._device.zeros(deviator.shape))
-        self._act(near, neighbours, carried, acceleration, limits)
+    def accelerate_among(self, near: Near, chosen: Any, carried: Carried, acceleration: Any, limits: Any) -> None:
+        """As accelerate(), of the particles `chosen` (ascending rows) alone, with what they have `carried`."""
+        among = (chosen, near.own, near.particles, near.plan.key.device, near.support)
+        self._act(near, self._search.find_among(*among), carried, acceleration, limits)
 
     def _act(self, near: Near, neighbours: Neighbours, carried: Carried, acceleration: Any, limits: Any) -> None:
         D, own, run, pairs = self._dimensions, near.own, self._device.run, (near.particles, neighbours)
-        tension = near.tensor if self._repels else ()
-        correction, stress = (self._device.empty((own, width)) for width in (D * D, D * D + len(tension)))
+        parity = near.matrix + (near.tensor if self._repels else ())
+        correction, stress = (self._device.empty((own, width)) for width in (D * D, len(parity)))
         run(self._kernels.correct_gradients, own, *pairs, carried.pressure, carried.deviator, correction, stress)
-        (stress,) = near.plan.exchange([(stress, near.matrix + tension)])
+        (stress,) = near.plan.exchange([(stress, parity)])
         if self._viscous.shape != neighbours.table.shape:
             self._viscous = self._device.empty(neighbours.table.shape)
         run(self._kernels.accelerate_pairs, own, *pairs, carried.rates, stress, acceleration, limits, self._viscous)
@@ -92,10 +88,10 @@ class UpdatedLagrangian:
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
         """Advance the energy by `dt` [s] with the old and the new `velocity` (count, D), and write the velocity
         gradient (own, D D) [1/s]; after accelerate()."""
-        self.strain_debris(columns, near, dt, velocity, gradient)
+        self.strain_among(columns, near, dt, velocity, gradient)
         columns.adopt("velocity_gradient", gradient)
 
-    def strain_debris(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
-        """As strain(), after accelerate_debris()."""
+    def strain_among(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
+        """As strain(), after accelerate_among()."""
         given = (dt, near.particles, self._pairs, velocity, *columns.write("energy"), gradient)
         self._device.run(self._kernels.strain_pairs, near.own, *given)

@@ -28,7 +28,7 @@ from distfsi.formulas.tensors import (
 
 SOFTENING = 15.0  # of the zero-energy stiffness with plastic strain; 3 follows the secant modulus
 SHORTEST = 1e-300  # s: steps of no length strain nothing
-LEAST_GROWTH = 0.1  # of the volume in a step that can be taken
+MINIMUM_GROWTH = 0.1  # of the volume in a step that can be taken
 ROUGH = 5.0  # over the share of the velocities that is unseen, above which viscosity has its linear part in full
 SHOCKED = 30.0  # jumps of velocity to the sound speed, above which it does at cracks and contacts
 
@@ -67,13 +67,13 @@ def unseen_share(rates, moved, relative2):
     """How much of its linear viscosity a particle has, 0 to 1: by the share of its partners' motion that is not linear.
 
     `relative2` is the sum of w (v_j - v_i)^2 and `moved` that of (v_j - v_i) g, for which `rates` is the fit of least
-    squares; what the fit budget for is rates : moved.
+    squares; of the former the fit accounts for rates : moved.
     """
     return min(ROUGH * max(1.0 - contraction(rates, moved) / max(relative2, SHORTEST), 0.0), 1.0)
 
 
 def shocked_share(divergence, size, sound_speed):
-    """The same by the jump of velocity, where what no linear field budget for is a crack or a contact."""
+    """The same by the jump of velocity: at cracks and contacts motion is not linear without a shock."""
     return min(SHOCKED * max(-size * divergence, 0.0) / sound_speed, 1.0)
 
 
@@ -119,12 +119,12 @@ def bond_stress(deviator, pressure, deformation, correction, stiffness):
     )
 
 
-def least_stretch(deformation):
+def minimum_stretch(deformation):
     """Lower bound of the principal stretches, exact in one and two dimensions."""
-    return 1.0 / largest_stretch(transposed(inverse(deformation)))
+    return 1.0 / maximum_stretch(transposed(inverse(deformation)))
 
 
-def largest_stretch(deformation):
+def maximum_stretch(deformation):
     """Upper bound of the principal stretches, tight when the others are equal (Wolkowicz & Styan 1980)."""
     squared = product(transposed(deformation), deformation)
     mean = trace(squared) * (1.0 / DIMENSIONS)
@@ -138,7 +138,7 @@ def signal_time(shortest, sound_speed, viscous_pressure, density):
     return 0.3 * shortest / signal
 
 
-def most_stretched(deformation):
+def maximum_stretch_direction(deformation):
     """Unit vector along the largest principal stretch, in the reference state: a column of a high power of a matrix
     that has the axes of the strain and no negative eigenvalue."""
     squared = product(transposed(deformation), deformation)

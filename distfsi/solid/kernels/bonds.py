@@ -19,11 +19,11 @@ from distfsi.formulas.tensors import (
     trace,
 )
 from distfsi.solid.formulas.bonds import (
-    LEAST_GROWTH,
+    MINIMUM_GROWTH,
     bond_stress,
     bulk_viscosity,
-    largest_stretch,
-    least_stretch,
+    maximum_stretch,
+    minimum_stretch,
     shocked_share,
     signal_time,
     unseen_share,
@@ -47,7 +47,6 @@ from distfsi.solid.kernels.records import (
     BODY,
     CRACK,
     DAMAGE,
-    DEBRIS,
     DETACHING,
     DISPLACEMENT,
     EXPOSED,
@@ -55,6 +54,7 @@ from distfsi.solid.kernels.records import (
     RUPTURE_LENGTH,
     STIFFNESS,
     STRETCH,
+    UNBONDED,
     VOLUME,
     Bodies,
     BondedMaterial,
@@ -68,8 +68,8 @@ from distfsi.solid.kernels.records import (
 )
 
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
-DETACHING_BELOW = 0.1  # least eigenvalue of the moment, below which the gradient's correction fades
-LEAST_FITTED = 0.5  # of the volume that the material has: bonds on one side alone may make it any
+DETACHING_BELOW = 0.1  # smallest eigenvalue of the moment, below which the gradient's correction fades
+MINIMUM_FITTED = 0.5  # of the volume that the material has: bonds on one side alone may make it any
 
 
 # ---- a bond ----------------------------------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ def weigh_bonds(begin, end, reference, payload, bodies: Bodies, body, bonds: Bon
 def fit_bonds(begin, end, chosen, bonds: Bonds, reference, bond_state, fit: Fit, moments):
     """Row r: gradient correction and deformation gradient of particle chosen[r], from the bonds that it has.
 
-    moments[r] = determinant and least eigenvalue of the moment of its bonds.
+    moments[r] = determinant and smallest eigenvalue of the moment of its bonds.
     """
     for r in range(begin, end):
         i = chosen[r]
@@ -170,7 +170,7 @@ def accept_fit(begin, end, chosen, found: Fit, moments, volumes: Volumes, fit: F
         i = chosen[r]
         growth = exp(volumes.void[i]) * volumes.mass[i] / (volumes.density[i] * volumes.volume[i])
         fitted = determinant(matrix_of(found.deformation, r))
-        if moments[r, 1] > DETACHING_BELOW and fitted > LEAST_FITTED * growth:
+        if moments[r, 1] > DETACHING_BELOW and fitted > MINIMUM_FITTED * growth:
             for k in range(DIMENSIONS * DIMENSIONS):
                 fit.correction[i, k] = found.correction[r, k]
                 fit.deformation[i, k] = found.deformation[r, k]
@@ -187,7 +187,7 @@ def accept_fit(begin, end, chosen, found: Fit, moments, volumes: Volumes, fit: F
 def own_stretch(deformation, damage, i):
     """Largest stretch of the material of a particle; what a failed one sees besides is the opening of cracks."""
     if FAILS:
-        return largest_stretch(matrix_of(deformation, i)) if damage[i] < 1.0 else 1.0
+        return maximum_stretch(matrix_of(deformation, i)) if damage[i] < 1.0 else 1.0
     return 1.0
 
 
@@ -201,7 +201,7 @@ def pack_payload(begin, end, volume, body, cohesion: Cohesion, deformation, dama
         payload[i, NEIGHBOURHOOD_DAMAGE] = cohesion.neighbourhood_damage[i]
         payload[i, DETACHING] = 1.0 if cohesion.detaching[i] > 0 else 0.0
         payload[i, EXPOSED] = 1.0 if cohesion.exposed[i] > 0 else 0.0
-        payload[i, DEBRIS] = 1.0 if cohesion.bond_count[i] == 0 else 0.0
+        payload[i, UNBONDED] = 1.0 if cohesion.bond_count[i] <= 0 else 0.0
         payload[i, RUPTURE_LENGTH] = cohesion.rupture_length[i]
         payload[i, STRETCH] = own_stretch(deformation, damage, i)
         for d in static_range(DIMENSIONS):
@@ -277,7 +277,7 @@ def strain_bonds(begin, end, dt, bonds: Bonds, bond_state, motion, point: Bonded
             # Deformation, if it can be.
             before, fitted = matrix_of(fit.deformation, i), product(moved, matrix_of(fit.correction, i))
             after = matrix_sum(before, scaled(dt, fitted))
-            if determinant(after) > LEAST_GROWTH * determinant(before):
+            if determinant(after) > MINIMUM_GROWTH * determinant(before):
                 rates = whole_step(before, after, dt)
                 store_matrix(fit.deformation, i, after)
                 store_matrix(result.gradient, i, rates)
@@ -295,7 +295,7 @@ def limit_bonds(begin, end, bond_count, bodies: Bodies, material: BondedMaterial
     """limits[i] = the time steps that a bonded particle allows."""
     for i in range(begin, end):
         if bond_count[i] > 0:
-            shortest = bodies.smoothing[material.body[i]] * least_stretch(matrix_of(deformation, i))
+            shortest = bodies.smoothing[material.body[i]] * minimum_stretch(matrix_of(deformation, i))
             a = vector_of(acceleration, i)
             sound_speed, viscous_pressure = material.sound_speed[i], material.viscous_pressure[i]
             limits[i, 0] = signal_time(shortest, sound_speed, viscous_pressure, material.density[i])

@@ -12,12 +12,12 @@ from distfsi.solid.formulas.contact import contact_force
 from distfsi.solid.kernels.matrices import difference, zero_vector
 from distfsi.solid.kernels.records import (
     BODY,
-    DEBRIS,
     DENSITY,
     EXPOSED,
     MASS,
     RUPTURE_LENGTH,
     SOUND_SPEED,
+    UNBONDED,
     VELOCITY,
     Contacts,
     Neighbours,
@@ -32,7 +32,7 @@ SAME_BODY = 0.6  # of the size: lattices that flow plastically do not touch them
 
 @driver
 def mark_exposed(begin, end, state, payload, key, continued, size, rupture_length, side, mark):
-    """mark[i] = 1 for exposed particles and debris, else 0; size[i], rupture_length[i] and side[i] = size, rupture
+    """mark[i] = 1 for exposed and unbonded particles, else 0; size[i], rupture_length[i] and side[i] = size, rupture
     length and body of `Contacts`.
 
     continued (bodies,): the axes, as bits, along which a body goes on behind a symmetry plane; an image at a plane
@@ -44,13 +44,13 @@ def mark_exposed(begin, end, state, payload, key, continued, size, rupture_lengt
         size[i] = side_of_cube(state[i, MASS] / state[i, DENSITY])
         rupture_length[i] = payload[i, RUPTURE_LENGTH]
         side[i] = own + (len(continued) if beyond else 0)
-        mark[i] = 1 if payload[i, EXPOSED] > 0.0 or payload[i, DEBRIS] > 0.0 else 0
+        mark[i] = 1 if payload[i, EXPOSED] > 0.0 or payload[i, UNBONDED] > 0.0 else 0
 
 
 @helper
 def identity_of(key, payload, i):
-    """A particle's key, and whether it is debris."""
-    return 2 * key[i] + (1 if payload[i, DEBRIS] > 0.0 else 0)
+    """A particle's key, and whether it is unbonded."""
+    return 2 * key[i] + (1 if payload[i, UNBONDED] > 0.0 else 0)
 
 
 @driver

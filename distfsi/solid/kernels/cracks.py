@@ -4,20 +4,21 @@ from math import sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS
+from distfsi.formulas.symbols import COMPONENTS, DIMENSIONS
 from distfsi.formulas.tensors import dot, times
-from distfsi.solid.formulas.bonds import crack_seen, is_face, most_stretched
+from distfsi.solid.formulas.bonds import crack_seen, is_face, maximum_stretch_direction
 from distfsi.solid.kernels.bonds import bond_weight
 from distfsi.solid.kernels.material import has_failed
 from distfsi.solid.kernels.matrices import difference, matrix_of, store_vector, vector_of
 from distfsi.solid.kernels.records import (
     CRACK,
     DAMAGE,
-    DEBRIS,
     DETACHING,
     DISPLACEMENT,
     NEIGHBOURHOOD_DAMAGE,
+    NEVER_BONDED,
     STRETCH,
+    UNBONDED,
     Bodies,
     Bonds,
 )
@@ -39,9 +40,10 @@ def mark_damaged(begin, end, damage, mark):
 
 @driver
 def mark_breaking(begin, end, bond_count, detaching, damage, mark):
-    """mark[i] = 1 where a particle has failed, detaches or is debris, else 0."""
+    """mark[i] = 1 where a particle that has or had bonds has failed, detaches or is debris, else 0."""
     for i in range(begin, end):
-        mark[i] = 1 if has_failed(damage, i) or detaching[i] > 0 or bond_count[i] == 0 else 0
+        breaking = has_failed(damage, i) or detaching[i] > 0 or bond_count[i] == 0
+        mark[i] = 1 if breaking and bond_count[i] != NEVER_BONDED else 0
 
 
 @driver
@@ -52,10 +54,10 @@ def mark_cut(begin, end, lost, mark):
 
 
 @driver
-def mark_debris(begin, end, payload, mark):
-    """mark[i] = 1 for debris, else 0."""
+def mark_unbonded(begin, end, payload, mark):
+    """mark[i] = 1 for debris and particles of bodies without bonds, else 0."""
     for i in range(begin, end):
-        mark[i] = 1 if payload[i, DEBRIS] > 0.0 else 0
+        mark[i] = 1 if payload[i, UNBONDED] > 0.0 else 0
 
 
 @driver
@@ -80,9 +82,9 @@ def crack_of(payload, i):
 
 @helper
 def crack_opening(deformation, bonds: Bonds, reference, bond_state, spacing, i):
-    """Vector to the crack of a particle that has failed: half a spacing along its most stretched direction, to the
+    """Vector to the crack of a particle that has failed: half a spacing along its direction of maximum stretch, to the
     side where its bonds are stretched more; 0 where it has bonds on one side only."""
-    axis = most_stretched(matrix_of(deformation, i))
+    axis = maximum_stretch_direction(matrix_of(deformation, i))
     across = times(matrix_of(deformation, i), axis)
     ahead, behind, length2_ahead, length2_behind = 0.0, 0.0, 0.0, 0.0
     for n in range(bonds.count[i]):
@@ -179,5 +181,28 @@ def cut_bonds(begin, end, position, reference, bodies: Bodies, body, payload, ke
                 rupture_length[i] = min(rupture_length[i], sqrt(dot(x, x)))
         for n in range(kept, bonds.count[i]):
             key[i, n] = -1
-        lost[i] = bonds.count[i] - kept
-        bonds.count[i] = kept
+        lost[i] = max(bonds.count[i], 0) - kept
+        if lost[i] > 0:
+            bonds.count[i] = kept
+
+
+# ---- without bonds ---------------------------------------------------------------------------------------------------
+
+
+@driver
+def carry_unbonded(begin, end, bond_count, pressure, deviator, carried_pressure, carried_deviator):
+    """What particles act with that have no bonds: all that they carry where their body never had bonds, but debris with
+    no tension and no shear."""
+    for i in range(begin, end):
+        whole = bond_count[i] == NEVER_BONDED
+        carried_pressure[i] = pressure[i] if whole else max(pressure[i], 0.0)
+        for c in static_range(COMPONENTS):
+            carried_deviator[i, c] = deviator[i, c] if whole else 0.0
+
+
+@driver
+def keep_rates(begin, end, bond_count, gradient, rates):
+    """rates[i] = velocity gradient of a particle whose body never had bonds; 0 for others: each approach is damped."""
+    for i in range(begin, end):
+        for k in static_range(DIMENSIONS * DIMENSIONS):
+            rates[i, k] = gradient[i, k] if bond_count[i] == NEVER_BONDED else 0.0

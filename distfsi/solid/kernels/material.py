@@ -42,7 +42,7 @@ from distfsi.solid.formulas.stress import (
     von_mises,
 )
 from distfsi.solid.kernels.matrices import matrix_of, store_tensor, tensor_of
-from distfsi.solid.kernels.records import LawTables, MaterialPoints, RestState, Volumes
+from distfsi.solid.kernels.records import NEVER_BONDED, LawTables, MaterialPoints, RestState, Volumes
 
 
 @helper
@@ -63,6 +63,17 @@ def intact_deviator(point: MaterialPoints, law, damage, i):
         restored = 1.0 / share if share > 0.0 else 0.0
         return tuple(restored * point.deviator[i, c] for c in static_range(COMPONENTS))
     return tensor_of(point.deviator, i)
+
+
+@helper
+def grown_damage(laws: LawTables, memory: FailureMemory, width, own, load, dt, i):
+    """Damage after a load, which the failure model remembers with all else."""
+    law = tuple(laws.failure[own, k] for k in static_range(FAILURE_FIELDS))
+    known = tuple(memory[k][i] for k in static_range(FAILURE_COLUMNS))
+    found = failure_response(law, load, dt, width, known)
+    for k in static_range(FAILURE_COLUMNS):
+        memory[k][i] = found[k]
+    return found[0]
 
 
 @driver
@@ -121,19 +132,15 @@ def deform(
         # Damage, and the stress that is carried.
         carried, open_share = 1.0, 1.0
         if FAILS:
-            law = tuple(laws.failure[own, k] for k in static_range(FAILURE_FIELDS))
             principal = scale * largest_principal(stress) - pressure
-            energy = crack_energy(scale * elastic, pressure, shear_modulus, rest.bulk_modulus[own])
+            energy = crack_energy(scale * elastic, pressure, shear_modulus, at_rest[1])
             kept = tuple(flowed[3 + k] for k in static_range(STRENGTH_COLUMNS))
             heat = homologous_temperature(strength, kept)
             factor = point.strength_scatter[i] if SCATTERED else 1.0
             load = (increment, flowed[0], pressure, principal, energy, state[1], heat, factor)
-            worn = tuple(failure_memory[k][i] for k in static_range(FAILURE_COLUMNS))
-            damaged = failure_response(law, load, dt, rest.crack_width[own], worn)
-            for k in static_range(FAILURE_COLUMNS):
-                failure_memory[k][i] = damaged[k]
-            open_share = 1.0 - damaged[0]
-            carried = carried_share(strength, pressure, damaged[0])
+            damage = grown_damage(laws, failure_memory, rest.crack_width[own], own, load, dt, i)
+            open_share = 1.0 - damage
+            carried = carried_share(strength, pressure, damage)
         for c in static_range(COMPONENTS):
             point.deviator[i, c] = carried * scale * stress[c]
         point.pressure[i] = pressure if pressure > 0.0 else open_share * pressure
@@ -153,7 +160,7 @@ def open_voids(begin, end, chosen, dt, body, eos, energy, volumes: Volumes, bond
     way beyond that is void, and must close again first. `eos` (bodies, …): the numbers of their laws."""
     for r in range(begin, end):
         i = chosen[r]
-        if has_failed(damage, i) or bond_count[i] == 0:
+        if bond_count[i] == 0 or (has_failed(damage, i) and bond_count[i] != NEVER_BONDED):
             law = tuple(eos[body[i], k] for k in static_range(EOS_FIELDS))
             divergence = trace(matrix_of(gradient, i))
             # All growth of the volume so far and in this step, of which the material takes what it can.

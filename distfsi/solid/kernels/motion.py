@@ -5,7 +5,7 @@ from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS
 from distfsi.solid.kernels.records import DENSITY, MASS, SMOOTHING, SOUND_SPEED, VELOCITY
 
-WORK, IMPULSE = 0, 1  # columns of what is booked
+WORK, IMPULSE = 0, 1  # columns of the budget of kick()
 
 
 @driver
@@ -21,31 +21,33 @@ def pack_state(begin, end, mass, density, h, sound_speed, velocity, state):
 
 
 @driver
-def kick(begin, end, dt, mass, fixed, acceleration, velocity, booked):
+def kick(begin, end, dt, mass, fixed, acceleration, velocity, budget):
     """velocity[i] = that after `dt` of forces and gravity; a fixed particle keeps its own.
 
-    booked (n, 1 + D): work of gravity and of what moves the fixed particles; impulse that all forces leave.
+    budget (n, 1 + D): work of gravity and of what moves the fixed particles; impulse that all forces leave.
     """
     for i in range(begin, end):
         work = 0.0
         for d in static_range(DIMENSIONS):
+            # All forces; what holds a fixed particle takes them.
             weight = mass[i] * BODY_FORCE[d] * dt
             given = mass[i] * acceleration[i, d] * dt + weight
             held = -given if fixed[i] else 0.0
             before = velocity[i, d]
             after = before if fixed[i] else before + given / mass[i]
+            # Gravity works at the mean velocity.
             work += weight * 0.5 * (before + after) + held * after
-            booked[i, IMPULSE + d] = given + held
+            budget[i, IMPULSE + d] = given + held
             velocity[i, d] = after
-        booked[i, WORK] = work
+        budget[i, WORK] = work
 
 
 @driver
-def apply_impulse(begin, end, impulse, mass, fixed, mean, velocity, excess, booked):
+def apply_impulse(begin, end, impulse, mass, fixed, mean, velocity, excess, budget):
     """velocity[i] grows by what the fluid's impulse gives; that of a fixed particle does not.
 
     excess[i] = velocity at which the impulse works beyond the `mean` one with which the particle moved;
-    booked (n, 2 + D): work of the impulse, work of what holds the fixed particles; their impulse.
+    budget (n, 2 + D): work of the impulse, work of what holds the fixed particles; their impulse.
     """
     for i in range(begin, end):
         work, held_work = 0.0, 0.0
@@ -53,13 +55,14 @@ def apply_impulse(begin, end, impulse, mass, fixed, mean, velocity, excess, book
             given, before = impulse[i, d], velocity[i, d]
             held = -given if fixed[i] else 0.0
             gained = 0.0 if fixed[i] else given / mass[i]
+            # An impulse works at the mean of the velocities before and after it.
             work += given * (before + 0.5 * gained)
             held_work += held * before
-            booked[i, 2 + d] = held
+            budget[i, 2 + d] = held
             excess[i, d] = before - mean[i, d] + 0.5 * gained
             velocity[i, d] = before + gained
-        booked[i, 0] = work
-        booked[i, 1] = held_work
+        budget[i, 0] = work
+        budget[i, 1] = held_work
 
 
 @driver

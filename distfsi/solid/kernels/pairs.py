@@ -106,13 +106,6 @@ def correct_gradients(begin, end, particles: Particles, neighbours: Neighbours, 
 
 
 @driver
-def drop_tension(begin, end, pressure, compression):
-    """compression[i] = the pressure where it is none of tension, else 0."""
-    for i in range(begin, end):
-        compression[i] = max(pressure[i], 0.0)
-
-
-@driver
 def accelerate_pairs(
     begin, end, particles: Particles, neighbours: Neighbours, rates, stress, acceleration, limits, viscous
 ):

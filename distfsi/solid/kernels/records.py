@@ -13,7 +13,9 @@ MASS, DENSITY, SMOOTHING, SOUND_SPEED, VELOCITY = range(5)
 STIFFNESS, DISPLACEMENT = 0, 1
 
 # Columns of the payload: what ghosts get besides in the total Lagrangian form.
-VOLUME, BODY, DAMAGE, NEIGHBOURHOOD_DAMAGE, DETACHING, EXPOSED, DEBRIS, RUPTURE_LENGTH, STRETCH, CRACK = range(10)
+VOLUME, BODY, DAMAGE, NEIGHBOURHOOD_DAMAGE, DETACHING, EXPOSED, UNBONDED, RUPTURE_LENGTH, STRETCH, CRACK = range(10)
+
+NEVER_BONDED = -1  # in the place of the number of bonds: the particle's body has the updated Lagrangian form
 
 
 class Particles(NamedTuple):

@@ -64,8 +64,8 @@ class Compaction(SolidEos):
         elastic = self.crush_pressure / self.crush_strain * mu
         share = (mu - self.crush_strain) / (self.full_strain - self.crush_strain)
         crushing = self.crush_pressure + share * (self.lock_pressure - self.crush_pressure)
-        loose = elastic if mu < self.crush_strain else crushing
-        return loose if mu < self.full_strain else self.dense_pressure(mu)
+        porous = elastic if mu < self.crush_strain else crushing
+        return porous if mu < self.full_strain else self.dense_pressure(mu)
 
     def unloading_modulus(self, peak):
         """dp/dmu [Pa] of unloading from `peak`, between that of the sound and that of the dense material."""

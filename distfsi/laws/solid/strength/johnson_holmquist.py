@@ -40,7 +40,7 @@ class JohnsonHolmquist(Strength):
         Column("accumulated_damage", "1", "plastic strain over that at failure"),
         Column("bulking_pressure", "Pa", "pressure that damage has added"),
     )
-    needs = "polynomial"
+    partner = "polynomial"
 
     def check(self) -> None:
         """There is a strength at the elastic limit."""
