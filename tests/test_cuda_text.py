@@ -34,8 +34,8 @@ CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, 
 CUT_CELLS += (redistribution, spreading, volumes)
 SCHEMES = {"paper": (covering, spreading, states), "cut_cells": CUT_CELLS}
 SCHEMES["stairs"] = SCHEMES["cut_cells"]
-OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"push", "round_apertures", "round_fractions"}}
-OF_OTHER_SCHEMES["stairs"] = {"push", "absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
+OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"round_apertures", "round_fractions"}}
+OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
 ALWAYS |= {"find_neighbours", "apply_impulse"}
 

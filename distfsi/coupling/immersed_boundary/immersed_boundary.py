@@ -42,7 +42,7 @@ PARTICLE_DRIVERS = (
     covering.find_wall_velocity,
     spreading.find_homes,
     spreading.spread,
-    spreading.push,
+    states.find_impulse,
     states.clear,
 )
 FLUID_DRIVERS = (
@@ -243,7 +243,7 @@ class ImmersedBoundary:
         given = (self.reach, self._kinds, kinds.COVERED, self._transfer, self._seen_cells)
         device.run(k.spread, own, chosen, receivers, *given, gained, self._grid)
         impulse = device.empty((own, D))
-        device.run(k.push, own, p.mass, gained, impulse)
+        device.run(k.find_impulse, own, p.mass, gained, impulse)
         self._run(k.clear, cells.covered, D, self._transfer.reshape(-1), self._grid)
         self._created["wall"] -= self._per_block(cells.counts[:, COVERED_CELLS], cells.passed)
         return Transfer(impulse)

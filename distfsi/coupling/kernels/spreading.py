@@ -167,11 +167,3 @@ def spread(begin, end, chosen, particles: Receivers, radius, kind, giver, field,
                 for v in range(TRANSFERRED):
                     gained[chosen[first + i], v] = total[v * LANES + i]
             first += count
-
-
-@driver
-def push(begin, end, mass, gained, impulse):
-    """impulse[p] (D,) [N s] = mass times the velocity that a particle has gained."""
-    for p in range(begin, end):
-        for d in static_range(DIMENSIONS):
-            impulse[p, d] = mass[p] * gained[p, d]

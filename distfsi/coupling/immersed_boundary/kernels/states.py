@@ -148,6 +148,14 @@ def find_transfer(begin, end, covered, passed, velocity, inertia, transfer, grid
 
 
 @driver
+def find_impulse(begin, end, mass, gained, impulse):
+    """impulse[p] (D,) [N s] = mass times the velocity that a particle has gained."""
+    for p in range(begin, end):
+        for d in static_range(DIMENSIONS):
+            impulse[p, d] = mass[p] * gained[p, d]
+
+
+@driver
 def clear(begin, end, chosen, fields, values, grid: BlockGrid):
     """values (blocks, fields, Z, Y, X) = 0 in the cells `chosen`."""
     cells = block_size(grid)
