@@ -16,7 +16,7 @@ from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
 from distfsi.device.llvm_text import module_of
-from distfsi.device.llvm_types import REALS
+from distfsi.device.llvm_types import REALS, Array
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.device.native import Native
 from distfsi.formulas.subset import static_range
@@ -873,3 +873,11 @@ def test_a_second_process_finds_the_compiled_module(tmp_path, monkeypatch):
     ]
     assert [run.split() for run in runs] == [["1.0", "1"], ["1.0", "0"]]
     assert len(list(tmp_path.glob("exponentials_of_*.py"))) == 1
+
+
+def test_bodies_of_other_types_have_other_names_in_every_process():
+    """Processes leave machine code for each other; what is called alike there would be taken for one function."""
+    kernel = Native(exponentials_of, {}, {}, "float64")
+    doubles, floats = ((Array(element, 1),) * 2 for element in ("float64", "float32"))
+    names = [kernel.body(types)[0] for types in (doubles, floats, doubles)]
+    assert names[0] == names[2] != names[1]

@@ -119,7 +119,8 @@ class Native:
         returns."""
         compilation.begin()
         module, driver = module_of(self.driver, self.constants, self.bindings, self.real, types)
-        name = f"{self.name}.{compilation.made}"  # no other in this process has it
+        # The linker takes functions of one name for one function, also those that other processes have left on disk.
+        name = f"{self.name}.{hashlib.sha256(repr(types).encode()).hexdigest()[:16]}"
         own = re.compile(rf"^define internal (.*)@{re.escape(driver.name)}\(", re.MULTILINE)
         return name, own.sub(rf"define linkonce_odr \1@{name}(", module.text()), driver.returns
 
