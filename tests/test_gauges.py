@@ -293,7 +293,7 @@ def test_interpolation_leaves_out_what_is_covered(box):
     for block in range(box.fluid.blocks.local_count):
         x = box.fluid.blocks.cell_centers(block)[0]
         box.fluid.active(kind, block)[..., x > 1.0] = COVERED
-    coupling = SimpleNamespace(kind=DualArray(box.fluid.team, kind))
+    coupling = SimpleNamespace(kind=DualArray(box.fluid.device, kind))
     sampler = FluidSampler(box.fluid, coupling, np.array([[0.99, 0.3], [1.01, 0.3], [0.2, 0.2]]))
     density = sampler.values()[:, 1]
     assert density[0] == 5.0 and np.isnan(density[1]) and density[2] == 5.0

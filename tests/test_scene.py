@@ -193,6 +193,32 @@ def test_overrides_reach_tables_lists_and_names():
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((16, 8), (16, 8))
 
 
+SLAB = ROOT / "inputs" / "concrete_slab.toml"
+
+
+def test_former_words_are_read_with_a_note(tmp_path):
+    file = tmp_path / "slab.toml"
+    file.write_text(SLAB.read_text().replace("minimum_failure_strain", "least_failure_strain"))
+    scene, expected = load(file), load(SLAB)
+    assert scene.solid == expected.solid and expected.notes == ()
+    (note,) = scene.notes
+    assert note.startswith("slab.toml: solid.bodies.slab.strength.least_failure_strain (line ")
+    assert "is called minimum_failure_strain now" in note
+    tube = load(TUBE, ["coupling.scheme=paper"])
+    assert tube.coupling.scheme == "immersed_boundary"
+    assert tube.notes == (
+        "steel_tube.toml: coupling.scheme (--set): 'paper' is called 'immersed_boundary' now; read until 0.3.0",
+    )
+
+
+def test_a_former_key_beside_that_of_now_is_a_fault(faults):
+    text = SLAB.read_text().replace(
+        "minimum_failure_strain = 0.01", "minimum_failure_strain = 1\nleast_failure_strain = 1"
+    )
+    (fault,) = faults(text)
+    assert "least_failure_strain" in fault
+
+
 def test_faulty_overrides_are_told(faults):
     told = faults(
         GAS, "nonsense", "fluid.phases.gsa.gamma=1.3", "fluid.regions.1.density=1", "time.cfl=2", "time.end.x=1"

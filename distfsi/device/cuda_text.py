@@ -194,14 +194,14 @@ class Writer:
         self.items: ast.For | None = None  # the loop that the threads share
 
     def refuse(self, why: str) -> NotInSubset:
-        return NotInSubset(f"{self.source.place}, {self.source.function.__name__} in CUDA C: {why}")
+        return NotInSubset(f"{self.source.location}, {self.source.function.__name__} in CUDA C: {why}")
 
     def function(self, tree: ast.FunctionDef) -> str:
         """A device function."""
         names = [safe(argument.arg) for argument in tree.args.args]
         self.scopes = [set(names)]
         head = f"DEVICE auto {tree.name}({', '.join(f'auto {name}' for name in names)})"
-        return f"// {self.source.place}\n{head}\n{self.block(tree.body, 0)}"
+        return f"// {self.source.location}\n{head}\n{self.block(tree.body, 0)}"
 
     def driver(self, tree: ast.FunctionDef) -> str:
         """The device function whose threads share the items begin … end."""
@@ -378,7 +378,7 @@ class Writer:
         return f"{value}({self.indices(node.slice)})"
 
     def indices(self, node: ast.expr) -> str:
-        places = node.elts if isinstance(node, ast.Tuple) else [node]
-        if any(isinstance(place, ast.Constant) and place.value < 0 for place in places):
+        indices = node.elts if isinstance(node, ast.Tuple) else [node]
+        if any(isinstance(index, ast.Constant) and index.value < 0 for index in indices):
             raise self.refuse("an index below zero")
-        return ", ".join(str(p.value) if isinstance(p, ast.Constant) else self.expression(p) for p in places)
+        return ", ".join(str(i.value) if isinstance(i, ast.Constant) else self.expression(i) for i in indices)

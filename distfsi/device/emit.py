@@ -35,14 +35,14 @@ class _Numbered(ast.NodeTransformer):
     """Each Number, changing or not, becomes an item of the tuple of numbers."""
 
     def __init__(self, numbers: dict[str, float | Varying]):
-        self.numbers, self.places, self.found = numbers, list(numbers), False
+        self.numbers, self.positions, self.found = numbers, list(numbers), False
 
     def visit_Number(self, node: Number | Changing) -> ast.expr:
         self.found = True
         if node.id not in self.numbers:
             self.numbers[node.id] = node.value
-            self.places.append(node.id)
-        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
+            self.positions.append(node.id)
+        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.positions.index(node.id)), ast.Load())
 
     visit_Changing = visit_Number
 
@@ -84,7 +84,7 @@ class Emission:
         source = Source(function, self._records() | ({"self": law} if law else {}))
         name = source.name + suffix
         if name in self.functions:
-            raise NotInSubset(f"{source.place}: {name} is also the name of {self.functions[name][0].place}")
+            raise NotInSubset(f"{source.location}: {name} is also the name of {self.functions[name][0].location}")
         self.functions[name] = source, ast.FunctionDef()  # its name is taken
         lookup, call = (partial(find, source, scope, suffix) for find in (self._constant, self._callee))
         fold = Fold(source, lookup, call)
@@ -164,16 +164,16 @@ def callees_first(
     """Only what the `roots`, by default the last of the functions, still call after folding: callees first."""
     ordered: dict[str, tuple[Source, ast.FunctionDef]] = {}
 
-    def place(name: str) -> None:
+    def arrange(name: str) -> None:
         if name in ordered or name not in functions:
             return
         for node in ast.walk(functions[name][1]):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                place(node.func.id)
+                arrange(node.func.id)
         ordered[name] = functions[name]
 
     for root in [next(reversed(functions))] if roots is None else roots:
-        place(root)
+        arrange(root)
     return list(ordered.values())
 
 

@@ -99,7 +99,7 @@ class Source:
         return getattr(self.function, "__kind__", "formula")
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         module = self.function.__module__.replace(".", "/")
         return f"{module}.py, line {self.function.__code__.co_firstlineno}"
 
@@ -129,7 +129,7 @@ class Source:
         """A tree of its own for each call."""
         tree = _parsed(self.function)
         if not isinstance(tree, ast.FunctionDef):
-            raise NotInSubset(f"{self.place}: only plain functions can be emitted")
+            raise NotInSubset(f"{self.location}: only plain functions can be emitted")
         return copied(tree)
 
 

@@ -118,7 +118,7 @@ class Writer(Values):
             self.give_back(None)
         inlined = " alwaysinline" if self.source.kind in ("formula", "helper") else ""
         head = f"define internal {packed_type(self.returns)} @{name}({', '.join(parameters)}) nounwind{inlined} {{"
-        text = "\n".join([f"; {self.source.place}", head, "entry:", *self.slots, *self.lines, "}", ""])
+        text = "\n".join([f"; {self.source.location}", head, "entry:", *self.slots, *self.lines, "}", ""])
         return Function(name, self.returns, text)
 
     # ---- names -------------------------------------------------------------------------------------------------------
@@ -131,18 +131,18 @@ class Writer(Values):
         if name not in self.changing:
             self.scopes[-1][name] = value
             return
-        place = self.found(name)
-        if place is None:
+        variable = self.found(name)
+        if variable is None:
             addresses = [f"%{self.name('s')}" for _ in value.leaves]
             pairs = zip(addresses, leaf_types(value.type), strict=True)
             self.slots += [f"  {address} = alloca {kind}" for address, kind in pairs]
-            place = self.scopes[-1][name] = Slot(value.type, tuple(addresses))
-        if isinstance(place, Value):
+            variable = self.scopes[-1][name] = Slot(value.type, tuple(addresses))
+        if isinstance(variable, Value):
             raise self.refuse(f"{name} runs over a range, but gets another value")
-        if self.common(place.type, value.type) != place.type:
+        if self.common(variable.type, value.type) != variable.type:
             raise self.refuse(f"{name} gets a value of another type")
-        value = self.converted(value, place.type)
-        for kind, leaf, address in zip(leaf_types(place.type), value.leaves, place.addresses, strict=True):
+        value = self.converted(value, variable.type)
+        for kind, leaf, address in zip(leaf_types(variable.type), value.leaves, variable.addresses, strict=True):
             self.line(f"store {kind} {leaf}, ptr {address}")
 
     def truth(self, node: ast.expr) -> str:
@@ -214,7 +214,7 @@ class Writer(Values):
                 self.store(part, self.item(value, k))
         else:
             array = self.value(target.value)
-            self.put(array.type.element, self.address(array, self.places(target.slice)), value)
+            self.put(array.type.element, self.address(array, self.indices(target.slice)), value)
 
     def write_if(self, node: ast.If) -> None:
         yes, no, after = self.name("yes"), self.name("no"), self.name("after")
@@ -285,13 +285,13 @@ class Writer(Values):
         return Value(self.real, (number(node.value, self.real),))
 
     def value_of_name(self, node: ast.Name) -> Value:
-        place = self.found(node.id)
-        if place is None:
+        variable = self.found(node.id)
+        if variable is None:
             raise self.refuse(f"{node.id} has a value only inside a branch or loop; give it one before")
-        if isinstance(place, Value):
-            return place
-        pairs = zip(leaf_types(place.type), place.addresses, strict=True)
-        return Value(place.type, tuple(self.new(f"load {kind}, ptr {address}") for kind, address in pairs))
+        if isinstance(variable, Value):
+            return variable
+        pairs = zip(leaf_types(variable.type), variable.addresses, strict=True)
+        return Value(variable.type, tuple(self.new(f"load {kind}, ptr {address}") for kind, address in pairs))
 
     def value_of_tuple(self, node: ast.Tuple) -> Value:
         return joined([self.value(item) for item in node.elts])
@@ -357,17 +357,17 @@ class Writer(Values):
     def value_of_subscript(self, node: ast.Subscript) -> Value:
         whole = self.value(node.value)
         if isinstance(whole.type, Array):
-            return self.get(whole, self.places(node.slice))
+            return self.get(whole, self.indices(node.slice))
         if isinstance(node.slice, ast.Constant):
             return self.item(whole, node.slice.value)
         *others, chosen = parts_of(whole)
-        place = self.integer(node.slice)
+        index = self.integer(node.slice)
         for k, part in reversed(list(enumerate(others))):
-            chosen = self.selected(self.new(f"icmp eq i64 {place}, {k}"), part, self.converted(chosen, part.type))
+            chosen = self.selected(self.new(f"icmp eq i64 {index}, {k}"), part, self.converted(chosen, part.type))
         return chosen
 
-    def places(self, node: ast.expr) -> list[str]:
-        return [self.integer(place) for place in (node.elts if isinstance(node, ast.Tuple) else [node])]
+    def indices(self, node: ast.expr) -> list[str]:
+        return [self.integer(index) for index in (node.elts if isinstance(node, ast.Tuple) else [node])]
 
     def value_of_call(self, node: ast.Call) -> Value:
         values = [self.value(argument) for argument in node.args]

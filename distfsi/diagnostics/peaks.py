@@ -35,12 +35,12 @@ class Peaks:
         self.peaks, self.fluid, self.coupling = peaks, fluid, coupling
         model, blocks = fluid.model, fluid.blocks
         real = fluid.device_state.dtype.name
-        self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
+        self.kernels = fluid.device.build([kernels.remember_peaks], model.constants, model.bindings, real)
         fields = blocks.allocate(len(NAMES))
         fields[:, kernels.ARRIVAL] = np.inf
-        self.fields = DualArray(fluid.team, fields)
-        self._kind = coupling.kind if coupling else DualArray(fluid.team, blocks.allocate(1, np.uint8))
-        self._shape, self._extent = fluid.team.array(np.array(blocks.shape)), fluid.team.array(blocks.extent)
+        self.fields = DualArray(fluid.device, fields)
+        self._kind = coupling.kind if coupling else DualArray(fluid.device, blocks.allocate(1, np.uint8))
+        self._shape, self._extent = fluid.device.array(np.array(blocks.shape)), fluid.device.array(blocks.extent)
         self._layers = blocks.grid.ghost_layers
         self._rows = blocks.local_count * prod(blocks.shape[:2])
 
@@ -48,7 +48,7 @@ class Peaks:
         """Take in the step just made; before the first one the state at the start."""
         fluid, peaks = self.fluid, self.peaks
         before = fluid.previous if simulation.steps else fluid.device_state
-        fluid.team.run(
+        fluid.device.run(
             self.kernels.remember_peaks, self._rows, self._layers, fluid.device_state, before, self.fields.device,
             self._kind.read, self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure,
             simulation.time, simulation.dt,

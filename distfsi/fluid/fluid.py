@@ -51,30 +51,30 @@ class Fluid:
     cells; of the others.
     """
 
-    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
-        self.model, self.blocks, self.team = model, blocks, team
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device):
+        self.model, self.blocks, self.device = model, blocks, device
         self.stages = SCHEMES[scene.time.scheme]
-        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
+        self.exchange = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
         given = present(scene.fluid)
         real = given.precision
-        self.kernels = team.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
+        self.kernels = device.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
         initial = InitialState(given, model)
         self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
-        self._buffers = [DualArray(team, buffer) for buffer in buffers]
-        self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
+        self._buffers = [DualArray(device, buffer) for buffer in buffers]
+        self.tiling = Tiling(blocks, device, device.tile_cells(scene.performance.tile_cells), model.conserved)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
-        self._stages, self._calm = team.array(self.rest.stages), team.array(self.rest.calm)
-        self._extent = team.array(blocks.extent)
-        self._fastest = DualArray(team, np.zeros(blocks.local_count))
+        self._stages, self._calm = device.array(self.rest.stages), device.array(self.rest.calm)
+        self._extent = device.array(blocks.extent)
+        self._fastest = DualArray(device, np.zeros(blocks.local_count))
         self._before = self._accounted()
         self._signal: float | None = None
-        self._volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
+        self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
@@ -159,11 +159,11 @@ class Fluid:
     def begin_stage(self) -> None:
         """Find out which tiles are at rest."""
         self.rest.begin_stage()
-        self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
+        self._stages, self._calm = self.device.array(self.rest.stages), self.device.array(self.rest.calm)
 
     def end_stage(self, stage: Stage) -> None:
         """After all tiles were advanced; after the last stage the state is that of the new time."""
-        self.rest.stages = self.team.download(self._stages)
+        self.rest.stages = self.device.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
             new = self._buffers.pop(_output(stage.number))
@@ -178,8 +178,8 @@ class Fluid:
         states = States(self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device)
         step = StageStep(real(stage.b), real(dt), stage.weight, *self.rates(dt))
         given = self.tiling.arguments(self._calm, self._stages)
-        chosen = self.team.array(tiles)
-        self.team.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
+        chosen = self.device.array(tiles)
+        self.device.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
 
     def rates(self, dt: float) -> list[Any]:
         """dt/h [s/m] along each of three axes, in the fluid's precision."""
@@ -203,8 +203,8 @@ class Fluid:
         inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiling.block[~self.rest.settled])
         cells = self._buffers[0].device, self._first_active(), self._extent
-        chosen = self.team.array(changed)
-        self.team.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
+        chosen = self.device.array(changed)
+        self.device.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
         return float(np.max(self._fastest.host()))
 
     @property
@@ -218,7 +218,7 @@ class Fluid:
         if not self.blocks.local_count:
             return 0.0, (), ""
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
-        before = self.team.download(self.previous[block : block + 1])[(0, *self._inside(block))]
+        before = self.device.download(self.previous[block : block + 1])[(0, *self._inside(block))]
         with np.errstate(all="ignore"):
             W = self.model.formula("primitives")(before.astype(np.float64))
             c = self.model.formula("sound_speed")(W)

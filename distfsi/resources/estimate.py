@@ -135,11 +135,11 @@ class Resources:
 
     def _coupling_bytes(self, value: int) -> int:
         """Per cell, of values of so many bytes: what it is and the impulse on it; and what cuts it."""
-        D, paper = self.dimensions, 1 + FLOAT * self.dimensions
-        if self.scene.coupling.scheme == "paper":
-            return paper
+        D, every = self.dimensions, 1 + FLOAT * self.dimensions
+        if self.scene.coupling.scheme == "immersed_boundary":
+            return every
         swept = 3 if len(present(self.scene.fluid).phases) == 2 else 1
-        return paper + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
+        return every + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
 
     # ---- files -------------------------------------------------------------------------------------------------------
 

@@ -164,7 +164,7 @@ def sub_steps(scene: Scene, layout: Layout | None) -> float:
 def _step_rate(scene: Scene, layout: Layout | None) -> float:
     """1/dt [1/s]."""
     rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
-    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "paper" else 1
+    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "immersed_boundary" else 1
     return max(rate, _solid_rate(scene) / parts)
 
 

@@ -43,7 +43,11 @@ from distfsi.study.references import AIR, STEEL, STEEL_DENSITY, WATER
 from distfsi.study.stability import Map, Stability, Verdict, corners
 
 DIRECTORY = Path("out/study_stability_coupling")
-SCHEMES: dict[str, CouplingScheme] = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}
+SCHEMES: dict[str, CouplingScheme] = {
+    "cut cells": "cut_cells",
+    "staircase": "staircase",
+    "immersed boundary": "immersed_boundary",
+}
 SURVIVED, RANG, LEAKED, FAILED = range(4)
 VERDICTS = {"survived": "tab:green", "rang": "tab:olive", "leaked": "tab:orange", "failed": "tab:red"}
 CFL = (0.1, 0.5, 0.9)
