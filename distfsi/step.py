@@ -16,7 +16,8 @@ from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE
 from distfsi.coupling.protocol import Coupling
 from distfsi.device.timers import Timers
 from distfsi.errors import Diverged, StepFailed
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.requests import Request

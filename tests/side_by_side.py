@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from distfsi.device import cpu
-from distfsi.device.fold import flat_values
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
+from distfsi.device.source import flat_values
 
 
 class SideBySide:

@@ -12,8 +12,8 @@ from numba import typeof
 from distfsi.coupling.cut_cells.kernels import forces, nodal_distance
 from distfsi.coupling.kernels import spreading
 from distfsi.device import llvm_text
-from distfsi.device.fold import parameters_of
 from distfsi.device.native import Native
+from distfsi.device.source import parameters_of
 from distfsi.diagnostics.kernels import peaks
 from distfsi.fluid.kernels import rows as fluid
 from distfsi.fluid.kernels.records import StageStep

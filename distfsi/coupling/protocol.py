@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Stage
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.blocks import Snapshot
 
 

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from distfsi.device.cache import cache_directory
-from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.native import Native
+from distfsi.device.source import Bound, NotInSubset
 
 __all__ = ["Bound", "NotInSubset", "Cpu", "build", "cache_directory"]
 

@@ -14,20 +14,10 @@ from functools import partial
 import numpy as np
 
 from distfsi.device import markers
-from distfsi.device.fold import (
-    NUMBERS,
-    Bound,
-    Callee,
-    Changing,
-    Fold,
-    NotInSubset,
-    Number,
-    Source,
-    copied,
-    given,
-    is_fixed,
-    literal,
-)
+from distfsi.device.expressions import NUMBERS
+from distfsi.device.fold import Fold
+from distfsi.device.source import Bound, Callee, NotInSubset, Source
+from distfsi.device.trees import Changing, Number, copied, given, is_fixed, literal
 from distfsi.formulas.subset import Varying
 
 
@@ -61,6 +51,26 @@ class Numbers:
     def _now(self) -> tuple[float, ...]:
         values = (number.value if isinstance(number, Varying) else number for number in self._numbers)
         return tuple(map(self._real, values))
+
+
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound | type]) -> dict[str, float | Varying]:
+    """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
+    found: dict[str, float | Varying] = {}
+
+    def put(value: object, label: str) -> None:
+        if isinstance(value, tuple):
+            for k, item in enumerate(value):
+                put(item, f"{label}[{k}]")
+        elif isinstance(value, (float, Varying)):
+            found[label] = value
+
+    for name, value in constants.items():
+        put(value, name)
+    for word, bound in bindings.items():
+        if isinstance(bound, Bound):
+            for name, value in bound.constants.items():
+                put(value, f"{bound.owner or word}.{name}")
+    return found
 
 
 @dataclass

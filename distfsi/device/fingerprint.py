@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from types import CodeType
 
-from distfsi.device.fold import Bound, Source, fields_of, is_record
+from distfsi.device.source import Bound, Source, fields_of, is_record
 from distfsi.formulas.subset import Varying
 
 WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone

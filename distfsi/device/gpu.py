@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from distfsi.device.fold import Bound
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.device.source import Bound
 
 TILE_CELLS = ((256,), (32, 8), (16, 8, 16))
 MAXIMUM_THREADS = 256

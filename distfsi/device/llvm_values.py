@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from distfsi.device.exponential import EXPONENTIALS
-from distfsi.device.fold import NotInSubset, Source
 from distfsi.device.llvm_types import (
     BOOL,
     INTEGER,
@@ -23,6 +22,7 @@ from distfsi.device.llvm_types import (
     packed_type,
     parts_of,
 )
+from distfsi.device.source import NotInSubset, Source
 
 # what modules may call; `fabs` and `abs` are those of reals and integers
 DECLARED = [f"declare double @llvm.{word}.f64(double)" for word in ("sqrt", "log", "fabs", "floor")]

@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.cache import cache_directory, file_name, locked, write_whole
-from distfsi.device.emit import Emission, Numbers, callees_first
+from distfsi.device.emit import Emission, Numbers, callees_first, given_numbers
 from distfsi.device.fingerprint import fingerprint, texts_depend_on
-from distfsi.device.fold import Bound, flat_values, given_numbers
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
+from distfsi.device.source import Bound, flat_values
 from distfsi.narrowing import present
 
 

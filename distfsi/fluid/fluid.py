@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
+from distfsi.fluid import fields
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageStep, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
+from distfsi.fluid.stages import SCHEMES, Stage
 from distfsi.fluid.tiles import Tiling
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
@@ -22,20 +23,6 @@ from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.narrowing import present
 from distfsi.scene.description import Fluid as FluidOfScene
 from distfsi.scene.description import Scene
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One stage of a Runge-Kutta method: U_new = U_n + b (U - dt D(U) - U_n); `weight`: its share in the whole step."""
-
-    number: int
-    b: float
-    weight: float
-
-
-SSP_RK2 = (Stage(0, 1.0, 0.5), Stage(1, 0.5, 0.5))  # Gottlieb, Shu, Tadmor, SIAM Rev. 43, 2001
-SSP_RK3 = (Stage(0, 1.0, 1.0 / 6.0), Stage(1, 0.25, 1.0 / 6.0), Stage(2, 2.0 / 3.0, 2.0 / 3.0))  # paper, Eq. 16
-SCHEMES = {"rk2": SSP_RK2, "rk3": SSP_RK3}
 
 
 def _output(number: int) -> int:
@@ -219,11 +206,7 @@ class Fluid:
             return 0.0, (), ""
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
         before = self.device.download(self.previous[block : block + 1])[(0, *self._inside(block))]
-        with np.errstate(all="ignore"):
-            W = self.model.formula("primitives")(before.astype(np.float64))
-            c = self.model.formula("sound_speed")(W)
-        axes = range(self.model.dimensions)
-        speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
+        speeds = fields.speeds(self.model, before.astype(np.float64))
         signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
         cell = np.unravel_index(np.nanargmax(signal), signal.shape)
         position = self._position(block, cell)
@@ -327,46 +310,26 @@ class Fluid:
         `chosen`: the local blocks wanted, by default all.
         """
         chosen = np.arange(self.blocks.local_count) if chosen is None else chosen
-        names = ["density", "velocity", "pressure"] + (["volume_fraction"] if self.model.phases == 2 else [])
         shape = (len(chosen), *self.blocks.block_cells[::-1])
-        fields = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in names}
-        primitives, P, D = self.model.formula("primitives"), self.model.phases, self.model.dimensions
+        found = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in fields.names(self.model)}
         for row, block in enumerate(chosen):
             U = self.cells(block).astype(np.float64)
-            W = primitives(U)
             z, y, x = U.shape[1:]
-            values = {"density": U[:P].sum(axis=0), "pressure": W[P + D], "volume_fraction": U[-1]}
-            for name in names:
-                part = fields[name][row, :z, :y, :x]
-                if name == "velocity":
-                    part[..., :D] = np.stack(W[P : P + D], axis=-1)
-                else:
-                    part[:] = values[name]
+            for name, values in fields.written(self.model, U).items():
+                part = found[name][row, :z, :y, :x]
+                part[:] = values
                 if covered is not None:
                     part[self.active(covered, block)] = np.nan
-        return fields
+        return found
 
     def check(self, time: float, covered: np.ndarray | None = None) -> None:
         """Raise Diverged with position, time and state when a cell of this rank, not `covered`, has no valid state."""
         for block in range(self.blocks.local_count):
-            with np.errstate(all="ignore"):
-                W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
-                c = np.asarray(self.model.formula("sound_speed")(tuple(W)))
-            valid = np.isfinite(c) & np.isfinite(W).all(axis=0)
-            if covered is not None:
-                valid |= self.active(covered, block)
-            if not valid.all():
-                z, y, x = np.argwhere(~valid)[0]
-                where = f"at t = {time:.6g} s in the cell at ({self._position(block, (z, y, x))}) m"
-                values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
-                state = ", ".join(f"{name} {value:.6g}" for name, value in values)
-                raise Diverged(f"the fluid has no valid state {where}: {state}")
-
-    def _names(self) -> list[str]:
-        """Of the primitives."""
-        phases, axes = range(self.model.phases), "xyz"[: self.model.dimensions]
-        fraction = ["volume fraction"] if self.model.phases == 2 else []
-        return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), "pressure", *fraction]
+            ignored = covered is not None and self.active(covered, block)
+            invalid = fields.first_invalid(self.model, self.cells(block).astype(np.float64), ignored)
+            if invalid is not None:
+                where = f"at t = {time:.6g} s in the cell at ({self._position(block, invalid[0])}) m"
+                raise Diverged(f"the fluid has no valid state {where}: {invalid[1]}")
 
     def active(self, field: np.ndarray, block: int) -> np.ndarray:
         """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""

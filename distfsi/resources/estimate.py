@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 from scipy import ndimage, optimize
 
-from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
+from distfsi.fluid.stages import SSP_RK3
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.blocks import Blocks

@@ -21,9 +21,10 @@ from distfsi.coupling.cut_cells.wall_particles import WallParticles
 from distfsi.coupling.kernels.cells import COVERED, FLUID
 from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels import rows as row_kernels

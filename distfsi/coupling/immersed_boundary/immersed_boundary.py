@@ -18,9 +18,10 @@ from distfsi.coupling.kernels.interpolation import Cloud
 from distfsi.coupling.kernels.spreading import Receivers
 from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.stages import Stage
 from distfsi.mesh import search
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
