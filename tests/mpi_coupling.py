@@ -55,9 +55,23 @@ class Coupled:
     """Fluid, solid and coupling of a scene, and the step that joins them."""
 
     def __init__(
-        self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64",
-        scheme="immersed_boundary", cfl=0.4, runge_kutta="rk3", form="updated_lagrangian", drop_below=None,
-    ):  # fmt: skip
+        self,
+        bodies,
+        regions,
+        lower,
+        upper,
+        cells,
+        kinds=None,
+        block=8,
+        threads=1,
+        phases=AIR,
+        precision="float64",
+        scheme="immersed_boundary",
+        cfl=0.4,
+        runge_kutta="rk3",
+        form="updated_lagrangian",
+        drop_below=None,
+    ):
         D = len(lower)
         kinds = kinds or (("wall", "wall"),) * D
         regions = tuple(d.Region(state, shape) for state, shape in regions)

@@ -215,8 +215,15 @@ def test_waves_in_steel_travel_with_their_speeds(extents, spacing, moves, speed)
 
 def stretched(strain_rate, failure=None, spacing=0.1, **keywords):
     """A bar of soft metal whose ends fly apart."""
-    bar = body(Box((-0.6, -0.2), (0.6, 0.2)), spacing, 1000.0, (0.0, 0.0), LinearEos(3.25e6),
-               PerfectlyPlastic(0.7e6, 2e4), failure=failure)  # fmt: skip
+    bar = body(
+        Box((-0.6, -0.2), (0.6, 0.2)),
+        spacing,
+        1000.0,
+        (0.0, 0.0),
+        LinearEos(3.25e6),
+        PerfectlyPlastic(0.7e6, 2e4),
+        failure=failure,
+    )
     part = total_lagrangian([bar], (-4.0, -1.0), (4.0, 1.0), block_cells=16, **keywords)
     part.columns["velocity"][:, 0] = strain_rate * part.columns["position"][:, 0]
     return part

@@ -509,9 +509,7 @@ def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(sqrt(ratio), ratio, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
-    case = coupled(
-        [plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian"
-    )  # fmt: skip
+    case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian")
     c = case.solid.columns
     c["velocity"][:, 1] = 0.6 * np.sign(c["position"][:, 1] - 0.48)
     before, passed = case.balance(), False
@@ -860,9 +858,17 @@ def test_an_exponential_wave_in_water_throws_a_plate_as_taylor_says(psi):
     plate = body(Box((0.0,), (thickness,)), 0.5 * h, mass / thickness, (0,), stiffness=mass / thickness * sound**2)
     water = (gas(rho, base, (0,), 1), Box((low,), (0.5 * thickness,)))
     case = coupled(
-        [plate], [(gas(1.2, base, (0,)), None), water], (low,), (low + n * h,), (n,), (OPEN,), block=n, phases=phases,
-        cfl=0.5, runge_kutta="rk2",
-    )  # fmt: skip
+        [plate],
+        [(gas(1.2, base, (0,)), None), water],
+        (low,),
+        (low + n * h,),
+        (n,),
+        (OPEN,),
+        block=n,
+        phases=phases,
+        cfl=0.5,
+        runge_kutta="rk2",
+    )
     x, front = low + (np.arange(n) + 0.5) * h, -6 * h
     over = np.where(x < front, peak * np.exp((x - front) / (c * theta)), 0.0)
     W = primitives(case)[:, 0, 0]

@@ -25,9 +25,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROWS = (fluid.primitives_row, fluid.increments_row, fluid.flux_row, fluid.update_row, signal_row, peaks.peaks_row)
-REALS = {"rx", "ry", "rz", "ambient", "threshold", "time", "dt", "faces_rate"} | {
-    f"step_{name}" for name in StageStep._fields
-}
+REALS = {"rx", "ry", "rz", "limits_ambient", "limits_arrival", "step_time", "faces_rate"}
+REALS |= {f"step_{name}" for name in StageStep._fields}
+ARRAYS = ("states_", "step_before", "step_after")
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),
@@ -55,7 +55,7 @@ def native_row(row, scene):
     model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
     arguments = [
         np.zeros(1, np.uint8 if name == "K" else real)
-        if name.isupper() or name.startswith(("U_", "states_"))
+        if name.isupper() or name.startswith(ARRAYS)
         else np.dtype(real).type(0)
         if name in REALS
         else 0
