@@ -26,7 +26,8 @@ STRONGEST_SHOCK = 2e11  # of the curves [Pa]
 
 def listed(every: tuple[Material, ...]) -> str:
     """The names of all materials, by kind, with what they are."""
-    lines, kind = [], ""
+    lines: list[str | None] = []
+    kind = ""
     for material in every:
         if material.kind != kind:
             kind = material.kind
