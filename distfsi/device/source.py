@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, is_dataclass
 from dataclasses import fields as dataclass_fields
 from functools import cache
@@ -140,13 +140,15 @@ def parameters_of(function: Callable[..., Any], first: int = 2) -> list[str]:
     return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][first:]
 
 
-def flat_values(arguments: Iterable[object]) -> Iterator[object]:
+def flat_values(arguments: Iterable[object]) -> list[object]:
     """What a kernel is called with: its arguments, records replaced by their fields."""
+    flat: list[object] = []
     for argument in arguments:
         if isinstance(argument, tuple) and hasattr(argument, "_fields"):
-            yield from flat_values(argument)
+            flat += flat_values(argument)
         else:
-            yield argument
+            flat.append(argument)
+    return flat
 
 
 @cache

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from distfsi.narrowing import present
-from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene, Shape
+from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
 
@@ -47,11 +48,19 @@ class Layout:
         region = np.zeros(len(points), dtype=np.int64)
         for number, part in enumerate(self.fluid.regions):
             if part.shape is not None:
-                region[contains(part.shape, points)] = number
+                region[self._inside(part.shape, points)] = number
         reach = 0.5 * math.hypot(*self.spacing)
         for body in scene.solid.bodies if scene.solid else ():
             region[distance(body.shape, points) < reach] = COVERED
         self.region = region.reshape(grids[0].shape)
+
+    def _inside(self, shape: Shape, points: np.ndarray) -> np.ndarray:
+        """Which of `points` (n, D) lie in a shape; of one that lies between them, that about which it fills most."""
+        inside = contains(shape, points)
+        if not inside.any():
+            filled = cell_fractions(shape, tuple(self.centers), tuple(self.spacing)).ravel()
+            inside[np.argmax(filled)] = filled.any()
+        return inside
 
     @cached_property
     def contacts(self) -> list[Contact]:
