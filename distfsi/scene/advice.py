@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Cylinder, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.description import Ball, Body, Box, Composed, Cylinder, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 
 AXES, ENDS = "xyz", ("low", "high")
@@ -78,7 +78,7 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
 
 
 def thickness(body: Body, domain: Domain) -> float | None:
-    """Smallest extent of a body inside the domain [m]; None for a half space, which has none."""
+    """Smallest extent of a body inside the domain [m]; None for a half space and for what is composed."""
     match body.shape:
         case Box(lower, upper):
             low, high = np.maximum(lower, domain.lower), np.minimum(upper, domain.upper)
@@ -90,7 +90,7 @@ def thickness(body: Body, domain: Domain) -> float | None:
 
 
 def _extent(shape: Shape) -> float | None:
-    """Smallest extent of a shape [m]; None for a half space."""
+    """Smallest extent of a shape [m]; None for a half space and for what is composed."""
     match shape:
         case Box(lower, upper):
             return min(b - a for a, b in zip(lower, upper, strict=True))
@@ -100,6 +100,7 @@ def _extent(shape: Shape) -> float | None:
             return outer - inner
         case Cylinder(start, end, outer, inner):
             return min(math.dist(start, end), outer - inner if inner > 0.0 else 2.0 * outer)
+    return None
 
 
 def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
@@ -170,6 +171,8 @@ def _turns_around(scene: Scene, axis: int) -> bool:
     shapes, domain = _shapes(scene), scene.domain
     centers = {tuple(s.center[a] for a in across) for s in shapes if isinstance(s, Ball | Tube)}
     flat = [s for s in shapes if isinstance(s, HalfSpace | Box)]
+    if any(isinstance(s, Composed) for s in shapes):
+        return False
     if len(centers) != 1 or not all(_spans(shape, domain, a) for shape in flat for a in across):
         return False
     (center,) = centers

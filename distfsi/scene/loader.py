@@ -27,7 +27,7 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     file = File(path)
     text, data = _read(file)
     overridden, faults = apply(data, overrides)
-    sections, invalid = validate(data)
+    sections, invalid = validate(data, str(file.parent))
     scene, crossed = _assemble(sections, data, file.stem)
     faults += invalid + crossed
     if faults:
@@ -54,9 +54,10 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
         raise InputError([f"{file}: is no TOML: {error}"]) from error
 
 
-def validate(data: dict[str, Any]) -> tuple[Sections, list[Fault]]:
-    """The sections of `data` that are valid in themselves, and the faults of the others."""
-    context = context_of(data)
+def validate(data: dict[str, Any], folder: str) -> tuple[Sections, list[Fault]]:
+    """The sections of `data` that are valid in themselves, and the faults of the others. Names of files that `data`
+    holds count from `folder`."""
+    context = context_of(data, folder)
     try:
         return Input.model_validate(data, context=context), []
     except ValidationError as error:

@@ -1,13 +1,20 @@
-"""Geometry of the shapes: which points lie inside, how large they are, how much of each cell they fill."""
+"""Geometry of the shapes: which points lie inside, how large they are, how much of each cell they fill.
+
+Shapes made of others bring their own: scene/composed.py, scene/surface.py, scene/cloud.py.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Shape, Tube
+from distfsi.scene.description import Ball, Box, Composed, Cylinder, HalfSpace, Shape, Tube
+from distfsi.scene.measure import parts_inside
 
+ROUNDING = 1e-12
 SUBPOINTS = 8  # per axis, in cells that a curved or oblique surface may cut
 
 
@@ -16,17 +23,20 @@ def dimensions(shape: Shape) -> int:
     match shape:
         case Box(corner, _) | HalfSpace(corner, _) | Cylinder(corner):
             return len(corner)
+        case Composed():
+            return shape.dimensions
     return len(shape.center)
 
 
 def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     """Signed distance [m] of `points` (n, D) to the surface of `shape`, negative inside -> (n,).
 
-    Outside the edges of a Box or a Cylinder it is the largest of the distances to its faces.
+    It is the true one where `has_true_distance` says so, otherwise a bound: of the right sign, and nowhere farther from
+    zero.
     """
     match shape:
         case Box(lower, upper):
-            return np.maximum(np.asarray(lower) - points, points - np.asarray(upper)).max(axis=1)
+            return meet(*np.maximum(np.asarray(lower) - points, points - np.asarray(upper)).T)
         case Ball(center, radius):
             return _radius(points, center) - radius
         case HalfSpace(point, normal):
@@ -37,7 +47,21 @@ def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
         case Cylinder(start, end, outer, inner):
             along, r = cylinder_coordinates(shape, points)
             ends = np.maximum(-along, along - math.dist(start, end))
-            return np.maximum(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
+            return meet(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
+        case Composed():
+            return shape.distance(points)
+
+
+def meet(*distances: np.ndarray) -> np.ndarray:
+    """Signed distance to what several regions have in common whose surfaces stand upright on each other, from the
+    distances to each: beside an edge that to the edge."""
+    nearest = np.maximum.reduce(distances)
+    return np.where(nearest > 0.0, np.sqrt(sum(np.maximum(d, 0.0) ** 2 for d in distances)), nearest)
+
+
+def has_true_distance(shape: Shape) -> bool:
+    """Whether `distance` is the true one, and not a bound."""
+    return shape.exact if isinstance(shape, Composed) else True
 
 
 def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,9 +99,30 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
                 (d,) = axes
                 (upper if normal[d] > 0.0 else lower)[d] = point[d]
             return tuple(lower), tuple(upper)
+        case Composed():
+            axes = np.eye(shape.dimensions)
+            return tuple(-shape.support(-axis) for axis in axes), tuple(shape.support(axis) for axis in axes)
 
 
-def volume(shape: Box | Ball | Tube | Cylinder) -> float:
+def support(shape: Shape, normal: np.ndarray) -> float:
+    """How far `shape` reaches along `normal` (D,) of length 1 [m]: largest x . normal of its points, or a bound."""
+    match shape:
+        case Box(lower, upper):
+            return float(np.maximum(np.asarray(lower) * normal, np.asarray(upper) * normal).sum())
+        case Ball(center, radius) | Tube(center, _, radius):
+            return float(np.asarray(center) @ normal) + radius
+        case Cylinder(start, end, radius):
+            axis = (np.asarray(end) - np.asarray(start)) / math.dist(start, end)
+            ends = max(np.asarray(start) @ normal, np.asarray(end) @ normal)
+            return float(ends + radius * math.sqrt(max(1.0 - (axis @ normal) ** 2, 0.0)))
+        case HalfSpace(point, outward):
+            along = np.asarray(outward) / math.hypot(*outward)
+            return float(np.asarray(point) @ normal) if along @ normal > 1.0 - ROUNDING else math.inf
+        case Composed():
+            return shape.support(normal)
+
+
+def volume(shape: Box | Ball | Tube | Cylinder | Composed) -> float:
     """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
@@ -89,17 +134,19 @@ def volume(shape: Box | Ball | Tube | Cylinder) -> float:
             return ball[len(center) - 1] * (outer ** len(center) - inner ** len(center))
         case Cylinder(start, end, outer, inner):
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
+        case Composed():
+            return shape.volume()
 
 
 def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple[float, ...]) -> np.ndarray:
     """Fraction of each cell of a grid that lies inside `shape`, shape ([nz,] [ny,] nx).
 
-    `centers` holds the cell centers along each axis, `spacing` the cell sizes [m]. Exact for boxes; otherwise cells
-    that the surface may cut are sampled at SUBPOINTS points per axis. A cell's value depends on its own center only,
-    so it is the same however the domain is cut into blocks.
+    `centers` holds the cell centers along each axis, `spacing` the cell sizes [m]. Exact for boxes. Other cells that
+    the surface may cut are sampled at SUBPOINTS points per axis; a composed shape is cut by a plane there. A cell's
+    value depends on its own center only, so it is the same however the domain is cut into blocks.
     """
     shape_of_grid = tuple(len(x) for x in reversed(centers))
-    if _is_its_bounding_box(shape):
+    if is_its_bounding_box(shape):
         lower, upper = bounding_box(shape)
         return _outer_product([_overlap(*args) for args in zip(lower, upper, centers, spacing, strict=True)])
     grids = np.meshgrid(*reversed(centers), indexing="ij")
@@ -107,18 +154,36 @@ def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple
     signed = distance(shape, points)
     fractions = (signed < 0.0).astype(np.float64)
     cut = np.flatnonzero(np.abs(signed) < 0.5001 * math.hypot(*spacing))
-    hits = sum(contains(shape, points[cut] + offset) for offset in _offsets(spacing))
-    fractions[cut] = hits / SUBPOINTS ** len(centers)
+    if isinstance(shape, Composed):
+        fractions[cut], _ = parts_inside(shape.distance, points[cut], signed[cut], np.asarray(spacing))
+    else:
+        hits = sum(contains(shape, points[cut] + offset) for offset in _offsets(spacing))
+        fractions[cut] = hits / SUBPOINTS ** len(centers)
     return fractions.reshape(shape_of_grid)
 
 
-def _is_its_bounding_box(shape: Shape) -> bool:
+def is_its_bounding_box(shape: Shape) -> bool:
+    """Whether `shape` fills its bounding box, up to rounding."""
     match shape:
+        case Composed():
+            return _fills_its_bounding_box(shape)
         case HalfSpace(_, normal):
             return sum(n != 0.0 for n in normal) == 1
         case Ball(center, _):
             return len(center) == 1
     return isinstance(shape, Box)
+
+
+@lru_cache(maxsize=256)
+def _fills_its_bounding_box(shape: Composed) -> bool:
+    lower, upper = (np.asarray(corner) for corner in bounding_box(shape))
+    extent = upper - lower
+    if not (np.all(np.isfinite(extent)) and np.all(extent > 0.0)):
+        return False
+    inner = np.array(list(itertools.product((1e-6, 1.0 - 1e-6), repeat=len(extent))))  # near its corners
+    if not contains(shape, lower + inner * extent).all():
+        return False
+    return abs(shape.volume() / math.prod(extent) - 1.0) < ROUNDING
 
 
 def _overlap(lower: float, upper: float, centers: np.ndarray, spacing: float) -> np.ndarray:
