@@ -57,8 +57,8 @@ def parts_inside(
     distance: Distance, centers: np.ndarray, signed: np.ndarray, size: np.ndarray, smooth: float = 0.01
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which part (n,) of boxes of `size` (D,) about `centers` (n, D), where the distance is `signed`, lies inside, and
-    whether the surface in each is flat. `smooth`: so far, in sizes, a surface may deviate from a plane where it is taken
-    as one; elsewhere points are counted."""
+    whether the surface in each is flat. `smooth`: so far, in sizes, a surface may deviate from a plane where it is
+    taken as one; elsewhere points are counted."""
     slopes = _slopes(distance, centers, size)
     error = _deviation(distance, centers, signed, slopes, size)
     parts, rough = parts_below(signed, slopes * size), np.flatnonzero(error > smooth)
