@@ -27,8 +27,9 @@ from distfsi.scene.composed import (
     rotation,
 )
 from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace
+from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.packing import pack
-from distfsi.scene.shapes import bounding_box, cell_fractions, contains, dimensions, distance, has_true_distance, volume
+from distfsi.scene.shapes import bounding_box, contains, dimensions, distance, has_true_distance, volume
 from distfsi.scene.surface import Mesh
 
 I_BEAM = ((0, 0), (10, 0), (10, 1), (5.5, 1), (5.5, 9), (10, 9), (10, 10), (0, 10), (0, 9), (4.5, 9), (4.5, 1), (0, 1))
@@ -275,6 +276,9 @@ def test_an_open_surface_still_has_an_inside(tmp_path):
     assert volume(inverted) == pytest.approx(whole.volume, rel=1e-12)
     center = np.zeros((1, 3))
     assert contains(opened, center) and contains(inverted, center)
+    (tmp_path / "scene.toml").write_text(SCENE.replace("SHAPE", '{ kind = "mesh", file = "open.ply", unit = "mm" }'))
+    (note,) = load(tmp_path / "scene.toml").notes
+    assert "fluid.regions.1.shape" in note and "not watertight" in note
 
 
 def test_particles_from_files(tmp_path):

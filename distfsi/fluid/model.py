@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
@@ -97,7 +97,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
         "ASYMMETRIC": asymmetric,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
-        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}

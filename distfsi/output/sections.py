@@ -107,8 +107,8 @@ def draw_view(
     regions: Sequence[tuple[int, np.ndarray]],
 ) -> Path:
     """Draw a scene in 3D without a screen: its domain as a frame, bodies by their `particles` (n, 3) [m] with their
-    spacing, the surfaces of regions by their number and the signed distances [m] of points of a grid (z, y, x). Raises InputError
-    without vtk."""
+    spacing, the surfaces of regions by their number and the signed distances [m] of points of a grid (z, y, x). Raises
+    InputError without vtk."""
     try:
         import vtk
         from vtk.util.numpy_support import numpy_to_vtk

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -154,6 +154,21 @@ def faces(shape: Shape) -> Faces | None:
 def _joined(each: list[Faces | None]) -> Faces | None:
     known = [one for one in each if one is not None]
     return tuple(frozenset().union(*sets) for sets in zip(*known, strict=True)) if len(known) == len(each) else None
+
+
+def meshes_in(shape: Shape | None) -> Iterator[Mesh]:
+    """All surfaces from files that a shape is made of."""
+    match shape:
+        case Mesh():
+            yield shape
+        case Placed(inner, _):
+            yield from meshes_in(inner)
+        case Union(parts) | Intersection(parts):
+            for part in parts:
+                yield from meshes_in(part)
+        case Difference(whole, removed):
+            for part in (whole, *removed):
+                yield from meshes_in(part)
 
 
 # ---- motions ---------------------------------------------------------------------------------------------------------

@@ -226,13 +226,13 @@ class CouplingInput(Table):
 
     scheme: description.CouplingScheme = Field(
         "cut_cells",
-        description='"cut_cells": conservative, tight and quiet; "stairs": the same with whole cells only, to compare '
-        'with: its forces on oblique walls are rough; "paper": covered cells copy the fluid',
+        description='"cut_cells": conservative, and walls do not leak; "staircase": the same with whole cells only, to '
+        'compare with: its forces on oblique walls are rough; "immersed_boundary": covered cells copy the fluid',
     )
     sub_steps: Annotated[int, Field(strict=True, ge=1)] = Field(
         8,
         description="most steps that the solid makes within one of the fluid, where its own must be shorter; "
-        '1 with "paper"',
+        '1 with "immersed_boundary"',
     )
     drop_below: quantity("Pa", gt=0.0) | None = Field(
         None,
