@@ -28,6 +28,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
+from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
@@ -86,7 +87,8 @@ class Simulation:
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
-        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
+        structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
+        solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
         coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))

@@ -12,9 +12,10 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, WrapVal
 
 from distfsi.scene import composed, description
 from distfsi.scene.cloud import Cloud
-from distfsi.scene.composed import Similarity, extruded, placed, reflection, revolved, rotation
+from distfsi.scene.composed import Similarity, extruded, placed, revolved
 from distfsi.scene.shapes import dimensions, support
 from distfsi.scene.surface import Mesh
+from distfsi.scene.turns import reflection, rotation
 from distfsi.scene.values import Count, Direction, Length, Position, Table, quantity
 
 if TYPE_CHECKING:
@@ -263,7 +264,9 @@ def _beside_the_input(value: str, info: ValidationInfo) -> str:
 
 
 FileName = Annotated[str, AfterValidator(_beside_the_input)]
-Unit = Annotated[str, Field(description='of its lengths, which the file itself does not know: "m", "mm", "in" ...')]
+Unit = Annotated[
+    str, Field(description='unit of its lengths, which the file itself does not know: "m", "mm", "in" ...')
+]
 
 
 class MeshFile(Composed):

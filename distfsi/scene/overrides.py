@@ -8,7 +8,11 @@ from typing import Any
 
 from distfsi.scene.faults import Fault, Path, dotted, one_of
 
-NAMED = {("fluid", "phases"): "phase", ("solid", "bodies"): "body"}  # tables of names, which an override cannot add to
+NAMED = {  # tables of names, which an override cannot add to
+    ("fluid", "phases"): "phase",
+    ("solid", "bodies"): "body",
+    ("solid", "obstacles"): "obstacle",
+}
 
 
 def apply(data: dict[str, Any], overrides: Iterable[str]) -> tuple[list[Path], list[Fault]]:

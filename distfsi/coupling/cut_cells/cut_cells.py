@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from distfsi.coupling.cut_cells.fluxes import BandFluxes
 from distfsi.coupling.cut_cells.forces import WallForces
 from distfsi.coupling.cut_cells.geometry import WallGeometry
 from distfsi.coupling.cut_cells.kernels.fluxes import StageTimes
-from distfsi.coupling.cut_cells.kernels.records import Walls
+from distfsi.coupling.cut_cells.kernels.records import WallLoads, Walls
 from distfsi.coupling.cut_cells.lone import LoneParticles
 from distfsi.coupling.cut_cells.merging import CellMerging
 from distfsi.coupling.cut_cells.redistribution import Redistribution
@@ -64,7 +65,7 @@ class CutCells:
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
             an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
             them, and has not)
-    geometry  of the last step; None before the first
+    geometry  of the last step; None before the first. That of a wall that stands is found once
     """
 
     causes = ("wall", "sides")
@@ -82,6 +83,7 @@ class CutCells:
         self._initial = InitialState(present(scene.fluid), model)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
+        self._settled = False
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         self._build(scene)
         self.sub_steps = scene.coupling.sub_steps
@@ -150,6 +152,8 @@ class CutCells:
     def update_geometry(self) -> CutGeometry:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall. From
         then on the fluid's band holds contents, until merge()."""
+        if self._settled:
+            return self._same_again(present(self.geometry))
         start = self._particles.start
         # particles
         passage = self._wall_particles.find(start)
@@ -168,6 +172,23 @@ class CutCells:
         self.geometry = CutGeometry(
             motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
         )
+        self._settled = self.solid.stands and self._is_settled(self.geometry)
+        return self.geometry
+
+    def _is_settled(self, geometry: CutGeometry) -> bool:
+        """Collective. Whether a wall that stands has left nothing to find again: no cells without their fluid, no lone
+        particles, no more cells to cover."""
+        lists, kind = geometry.lists, geometry.walls.kind
+        absorbed = self._redistribution.any_absorbed(lists.band, kind)
+        left = np.array([float(lists.uneven.shape[0]), float(geometry.lone.shape[0]), float(absorbed)])
+        return not self.blocks.communicator.maximum(left).any()
+
+    def _same_again(self, geometry: CutGeometry) -> CutGeometry:
+        """The geometry of a wall that stands, in its next step: only what the fluid gives to it begins anew."""
+        self._redistribution.take_contents(geometry.lists.band, self._redistribution.states(self.fluid.device_state))
+        loads, zeros = geometry.loads, self.device.zeros
+        fresh = (zeros(array.shape) for array in (loads.impulse, loads.work, loads.added))
+        self.geometry = replace(geometry, loads=WallLoads(loads.velocity, loads.inertia, *fresh))
         return self.geometry
 
     def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
@@ -338,6 +359,7 @@ class CutCells:
         self.wall.near.changed()
         position = self._particles.position
         self._wall_particles.cut(self._wall_particles.find(position), position, self._particles.velocity)
+        self._settled = False
 
     def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
