@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -72,11 +73,14 @@ class InitialState:
         ghosts = blocks.grid.ghosts[::-1]
         for region in self.fluid.regions:
             state = self.of(region.state)
-            parts = [np.ones(1)] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
+            parts = (
+                [np.ones((1, 1, 1))] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
+            )
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
+                where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
-                    self._lay_over(field[(block, slice(None), *active)], state, part)
+                    self._lay_over(field[where], state, part)
 
     def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
         """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,15 @@ class FluidModel:
 
     def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        bound = self.bindings[name]
-        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        if name not in self._made:
+            bound = self.bindings[name]
+            self._made[name] = plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        return self._made[name]
+
+    @cached_property
+    def _made(self) -> dict[str, Callable[..., Any]]:
+        """The formulas that were asked for before."""
+        return {}
 
 
 def fluid_model(scene: Scene) -> FluidModel:

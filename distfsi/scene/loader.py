@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from distfsi.errors import InputError
-from distfsi.scene import build, checks
+from distfsi.scene import build, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.description import Scene, Shape
 from distfsi.scene.diagnosis import diagnose
@@ -31,9 +31,10 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     text, data = _read(file)
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
+    unnamed, incomplete = materials.fill(data)
     sections, invalid = validate(data, str(file.parent))
     scene, crossed = _assemble(sections, data, file.stem)
-    faults += invalid + crossed
+    faults += unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:
         raise InputError(locations.tell(faults))
@@ -73,6 +74,10 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
         raise InputError([f"{file}: is no TOML: {error}"]) from error
 
 
+def _inside(path: Path, tables: Sequence[Path]) -> bool:
+    return any(path[: len(table)] == table for table in tables)
+
+
 def validate(data: dict[str, Any], folder: str) -> tuple[Sections, list[Fault]]:
     """The sections of `data` that are valid in themselves, and the faults of the others. Names of files that `data`
     holds count from `folder`."""
@@ -94,7 +99,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))
-    if faults or not isinstance(sections, Input):
+    if faults or domain is None or not isinstance(sections, Input):
         return None, faults
     scene = Scene(
         title=sections.title or stem,
