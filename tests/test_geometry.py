@@ -17,20 +17,11 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.scene import description as d
 from distfsi.scene import load
 from distfsi.scene.cloud import Cloud
-from distfsi.scene.composed import (
-    Difference,
-    Intersection,
-    Placed,
-    Polygon,
-    Similarity,
-    Union,
-    extruded,
-    placed,
-    revolved,
-)
+from distfsi.scene.composed import Difference, Intersection, Placed, Similarity, Union, placed
 from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace
 from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.packing import pack
+from distfsi.scene.sections import Polygon, extruded, revolved
 from distfsi.scene.shapes import bounding_box, contains, dimensions, distance, has_true_distance, volume
 from distfsi.scene.surface import Mesh
 from distfsi.scene.turns import rotation

@@ -6,7 +6,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from distfsi.coupling.cut_cells.cut_cells import CutCells
+from distfsi.coupling.cut_cells.redistribution import Redistribution
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
@@ -94,9 +94,9 @@ def test_gas_at_rest_stays_at_rest_around_an_oblique_obstacle(tmp_path):
 def test_a_wall_that_stands_is_found_once_and_no_bit_depends_on_it(tmp_path, monkeypatch):
     """A blast on a block; the same with its geometry found in each step."""
     states, cuts = [], []
-    once = CutCells._is_settled
+    once = Redistribution.is_settled
     for found_once in (True, False):
-        monkeypatch.setattr(CutCells, "_is_settled", once if found_once else lambda *_: False)
+        monkeypatch.setattr(Redistribution, "is_settled", once if found_once else lambda *_: False)
         simulation = simulation_of(tmp_path, SCENE + CHARGE + BLOCK)
         wall, count = simulation.coupling._wall_particles, 0
         cut = wall.cut

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -75,11 +76,11 @@ def _color(colors: Sequence[str], number: int) -> str:
 def _draw(axes: Axes, section: Section, regions: int) -> None:
     left, right, bottom, top = section.extent
     length, metres = scaled("m", max(right - left, top - bottom))
-    extent = [edge / length for edge in section.extent]
+    extent = (left / length, right / length, bottom / length, top / length)
     if section.region is not None:
         colors = ListedColormap([_color(REGION_COLORS, n) for n in range(regions)])
-        limits = {"vmin": -0.5, "vmax": regions - 0.5}
-        axes.imshow(section.region, cmap=colors, origin="lower", extent=extent, interpolation="nearest", **limits)
+        norm = Normalize(-0.5, regions - 0.5)
+        axes.imshow(section.region, cmap=colors, norm=norm, origin="lower", extent=extent, interpolation="nearest")
     for number, (name, signed) in enumerate(section.bodies.items()):
         color = _color(BODY_COLORS, number)
         rows, columns = signed.shape
@@ -119,7 +120,7 @@ def draw_view(
     renderer = vtk.vtkRenderer()
     renderer.SetBackground(1.0, 1.0, 1.0)
 
-    def show(source: object, color: str, opacity: float = 1.0) -> None:
+    def show(source: Any, color: str, opacity: float = 1.0) -> None:
         mapper = vtk.vtkPolyDataMapper()
         mapper.SetInputConnection(source.GetOutputPort())
         mapper.ScalarVisibilityOff()

@@ -98,8 +98,8 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
                 (high if normal[d] > 0.0 else low)[d] = point[d]
             return tuple(low), tuple(high)
         case Composed():
-            axes = np.eye(shape.dimensions)
-            return tuple(-shape.support(-axis) for axis in axes), tuple(shape.support(axis) for axis in axes)
+            normals = np.eye(shape.dimensions)
+            return tuple(-shape.support(-n) for n in normals), tuple(shape.support(n) for n in normals)
 
 
 def support(shape: Shape, normal: np.ndarray) -> float:
@@ -120,7 +120,7 @@ def support(shape: Shape, normal: np.ndarray) -> float:
             return shape.support(normal)
 
 
-def volume(shape: Box | Ball | Tube | Cylinder | Composed) -> float:
+def volume(shape: Shape) -> float:
     """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
@@ -132,6 +132,8 @@ def volume(shape: Box | Ball | Tube | Cylinder | Composed) -> float:
             return ball[len(center) - 1] * (outer ** len(center) - inner ** len(center))
         case Cylinder(start, end, outer, inner):
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
+        case HalfSpace():
+            return math.inf
         case Composed():
             return shape.volume()
 

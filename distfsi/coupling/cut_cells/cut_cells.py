@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from distfsi.coupling.cut_cells.fluxes import BandFluxes
 from distfsi.coupling.cut_cells.forces import WallForces
 from distfsi.coupling.cut_cells.geometry import WallGeometry
 from distfsi.coupling.cut_cells.kernels.fluxes import StageTimes
-from distfsi.coupling.cut_cells.kernels.records import WallLoads, Walls
+from distfsi.coupling.cut_cells.kernels.records import Walls
 from distfsi.coupling.cut_cells.lone import LoneParticles
 from distfsi.coupling.cut_cells.merging import CellMerging
 from distfsi.coupling.cut_cells.redistribution import Redistribution
@@ -150,7 +149,10 @@ class CutCells:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall. From
         then on the fluid's band holds contents, until merge()."""
         if self._settled:
-            return self._same_again(present(self.geometry))
+            self.geometry = geometry = present(self.geometry).again(self.device)
+            states = self._redistribution.states(self.fluid.device_state)
+            self._redistribution.take_contents(geometry.lists.band, states)
+            return geometry
         start = self._particles.start
         # particles
         passage = self._wall_particles.find(start)
@@ -169,23 +171,7 @@ class CutCells:
         self.geometry = CutGeometry(
             motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
         )
-        self._settled = self.solid.stands and self._is_settled(self.geometry)
-        return self.geometry
-
-    def _is_settled(self, geometry: CutGeometry) -> bool:
-        """Collective. Whether a wall that stands has left nothing to find again: no cells without their fluid, no lone
-        particles, no more cells to cover."""
-        lists, kind = geometry.lists, geometry.walls.kind
-        absorbed = self._redistribution.any_absorbed(lists.band, kind)
-        left = np.array([float(lists.uneven.shape[0]), float(geometry.lone.shape[0]), float(absorbed)])
-        return not self.blocks.communicator.maximum(left).any()
-
-    def _same_again(self, geometry: CutGeometry) -> CutGeometry:
-        """The geometry of a wall that stands, in its next step: only what the fluid gives to it begins anew."""
-        self._redistribution.take_contents(geometry.lists.band, self._redistribution.states(self.fluid.device_state))
-        loads, zeros = geometry.loads, self.device.zeros
-        fresh = (zeros(array.shape) for array in (loads.impulse, loads.work, loads.added))
-        self.geometry = replace(geometry, loads=WallLoads(loads.velocity, loads.inertia, *fresh))
+        self._settled = self.solid.stands and self._redistribution.is_settled(lists, rows, walls)
         return self.geometry
 
     def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
