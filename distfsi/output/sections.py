@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -79,8 +79,8 @@ def _draw(axes: Axes, section: Section, regions: int) -> None:
     extent = (left / length, right / length, bottom / length, top / length)
     if section.region is not None:
         colors = ListedColormap([_color(REGION_COLORS, n) for n in range(regions)])
-        norm = Normalize(-0.5, regions - 0.5)
-        axes.imshow(section.region, cmap=colors, norm=norm, origin="lower", extent=extent, interpolation="nearest")
+        picture = axes.imshow(section.region, cmap=colors, origin="lower", extent=extent, interpolation="nearest")
+        picture.set_clim(-0.5, regions - 0.5)
     for number, (name, signed) in enumerate(section.bodies.items()):
         color = _color(BODY_COLORS, number)
         rows, columns = signed.shape

@@ -23,7 +23,6 @@ from distfsi.scene.values import Count, Direction, Length, Position, Table, quan
 if TYPE_CHECKING:
     from distfsi.scene.mirrors import Shape
 
-Coordinate = quantity("m")
 Axis = Literal["x", "y", "z"]
 AXES = ("x", "y", "z")
 
@@ -226,8 +225,8 @@ class Extrude(Composed):
     kind: Literal["extrude"]
     section: Section = Field(description="shape in 2D: in the plane of the other two axes, in their order")
     axis: Axis = Field(description="along which it is drawn out")
-    lower: Coordinate = Field(description="where it begins on the axis")
-    upper: Coordinate = Field(description="where it ends")
+    lower: quantity("m") = Field(description="where it begins on the axis")
+    upper: quantity("m") = Field(description="where it ends")
 
     def build(self) -> description.Shape:
         if self.lower >= self.upper:

@@ -98,8 +98,8 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
                 (high if normal[d] > 0.0 else low)[d] = point[d]
             return tuple(low), tuple(high)
         case Composed():
-            normals = np.eye(shape.dimensions)
-            return tuple(-shape.support(-n) for n in normals), tuple(shape.support(n) for n in normals)
+            along = np.eye(shape.dimensions)
+            return tuple(-shape.support(-axis) for axis in along), tuple(shape.support(axis) for axis in along)
 
 
 def support(shape: Shape, normal: np.ndarray) -> float:
@@ -121,7 +121,7 @@ def support(shape: Shape, normal: np.ndarray) -> float:
 
 
 def volume(shape: Shape) -> float:
-    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
+    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3], infinite of a HalfSpace."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
         case Box(lower, upper):
