@@ -11,6 +11,7 @@ import numpy as np
 
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
+from distfsi.narrowing import present
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.cloud import Cloud
 from distfsi.scene.description import (
@@ -67,7 +68,7 @@ def check(
     yield from check_output(sections.output, present, domain)
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
-        yield from check_obstacles(sections, solid, present, domain)
+        yield from check_obstacles(sections, solid, domain, "fluid" in present)
         yield from check_solid(solid, domain)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
@@ -144,9 +145,10 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
 
 
-def check_obstacles(sections: Sections, solid: Solid, present: Container[str], domain: Domain) -> Iterator[Fault]:
-    """There is something; and obstacles are what stands beside a fluid, alone so far."""
-    bodies, obstacles = sections.solid.bodies, sections.solid.obstacles
+def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """There is something; and obstacles are what stands in a fluid, alone so far."""
+    given = present(sections.solid)
+    bodies, obstacles = given.bodies, given.obstacles
     if not (bodies or obstacles):
         yield Fault(("solid", "bodies"), "is missing; expected [solid.bodies.NAME] or [solid.obstacles.NAME]")
     if not obstacles:
@@ -154,7 +156,7 @@ def check_obstacles(sections: Sections, solid: Solid, present: Container[str], d
     path = ("solid", "obstacles")
     if bodies:
         yield Fault(path, "beside bodies are not known yet; expected one or the other (a body may be held by `fixed`)")
-    if "fluid" not in present:
+    if not in_fluid:
         yield Fault(path, "are what a fluid meets; expected [fluid]")
     if sections.coupling.scheme == "immersed_boundary":
         yield Fault(("coupling", "scheme"), "'immersed_boundary' knows no obstacles; expected 'cut_cells'")

@@ -126,7 +126,7 @@ class Obstacles(Solid):
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
-        return super().snapshot() | {"values": {"time": np.array(self._time)}}
+        return {**super().snapshot(), "values": {"time": np.array(self._time)}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Collective. Go on from a snapshot, whose points may be on any rank."""
