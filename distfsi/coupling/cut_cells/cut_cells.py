@@ -141,7 +141,7 @@ class CutCells:
 
     def time_step(self) -> float:
         """Longest step [s] in which no particle of this rank goes farther than LARGEST_MOVE."""
-        lowest, highest = self._rows.bounds(self._particles.velocity)
+        lowest, highest = (np.zeros(1),) * 2 if self.solid.stands else self._rows.bounds(self._particles.velocity)
         speed = max(-lowest.min(), highest.max())
         return LARGEST_MOVE * self._narrowest / max(speed, 1e-300)
 
@@ -245,7 +245,7 @@ class CutCells:
         """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
         velocity of the wall: the fluid pays for it."""
         D, P, p = self._dimensions, self.model.phases, self._particles
-        states = self._redistribution.states(self.fluid.device_state)
+        states = None if self.solid.stands else self._redistribution.states(self.fluid.device_state)
         impulse, work = self._forces.correct(geometry, excess, transfer.shared, states)
         self._wall_sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
         self._wall_sums[:, -1] += p.work - work - transfer.dragged[:, -1]
