@@ -29,6 +29,7 @@ from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
+from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
@@ -91,7 +92,8 @@ class Simulation:
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, device.with_own_clock()) if model else None
-        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
+        structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
+        solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupling: Coupling | None = None
         if model and fluid and solid:
             coupled = COUPLINGS[scene.coupling.scheme]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from distfsi.laws.law import Source
+from distfsi.laws.solid.eos.linear import LinearEos
+from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.laws.sources.gravity import Gravity
 from distfsi.narrowing import present
 from distfsi.scene.description import (
@@ -22,10 +24,12 @@ from distfsi.scene.description import (
     Time,
 )
 from distfsi.scene.law_tables import SourceInput
+from distfsi.scene.motion import Motion
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
+    ObstacleInput,
     OutputInput,
     PerformanceInput,
     SolidInput,
@@ -108,9 +112,28 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
         )
         for name, body in given.bodies.items()
     )
+    rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    return Solid(bodies, given.smoothing, *viscosity, *form, given.zero_energy, given.artificial_stress)
+    rest = (given.zero_energy, given.artificial_stress, bool(rigid))
+    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
+
+
+def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:
+    """A body whose laws nobody asks for: no force ever acts in it."""
+    rest, motion = (0.0,) * dimensions, None
+    if given.motion is not None:
+        rows = len(given.motion.times)
+        motion = Motion(
+            given.motion.times,
+            given.motion.displacements or (rest,) * rows,
+            given.motion.angles or (0.0,) * rows,
+            given.motion.about or rest,
+            given.motion.axis or (),
+        )
+    shape = given.shape.build()
+    laws = (LinearEos(1.0), NoStrength())
+    return Body(name, shape, given.spacing, 1.0, rest, *laws, None, packing=given.packing, motion=motion)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

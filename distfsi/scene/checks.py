@@ -11,6 +11,7 @@ import numpy as np
 
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
+from distfsi.narrowing import present
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.cloud import Cloud
 from distfsi.scene.description import (
@@ -67,6 +68,7 @@ def check(
     yield from check_output(sections.output, present, domain)
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
+        yield from check_obstacles(sections, solid, domain, "fluid" in present)
         yield from check_solid(solid, domain)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
@@ -143,6 +145,27 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
 
 
+def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """There is something; and obstacles are what stands in a fluid, alone so far."""
+    given = present(sections.solid)
+    bodies, obstacles = given.bodies, given.obstacles
+    if not (bodies or obstacles):
+        yield Fault(("solid", "bodies"), "is missing; expected [solid.bodies.NAME] or [solid.obstacles.NAME]")
+    if not obstacles:
+        return
+    path = ("solid", "obstacles")
+    if bodies:
+        yield Fault(path, "beside bodies are not known yet; expected one or the other (a body may be held by `fixed`)")
+    if not in_fluid:
+        yield Fault(path, "are what a fluid meets; expected [fluid]")
+    if sections.coupling.scheme == "immersed_boundary":
+        yield Fault(("coupling", "scheme"), "'immersed_boundary' knows no obstacles; expected 'cut_cells'")
+    for body in solid.bodies:
+        if body.motion and any(body.motion.angles) and bool(body.motion.axis) != (domain.dimensions == 3):
+            text = "an axis is needed to turn in 3D" if domain.dimensions == 3 else "only in 3D there is an axis"
+            yield Fault((*path, body.name, "motion"), text)
+
+
 def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
     """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
     if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
@@ -152,7 +175,7 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
-        path = ("solid", "bodies", body.name)
+        path = (*_bodies_of(solid), body.name)
         faults = list(_check_body(path, body, domain))
         if faults:
             yield from faults
@@ -169,7 +192,12 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             packed.append((body, positions))
     for first, second in itertools.combinations(packed, 2):
         if _overlap(first, second):
-            yield Fault(("solid", "bodies", second[0].name, "shape"), f"overlaps body '{first[0].name}'")
+            yield Fault((*_bodies_of(solid), second[0].name, "shape"), f"overlaps body '{first[0].name}'")
+
+
+def _bodies_of(solid: Solid) -> Path:
+    """Where the input has them."""
+    return ("solid", "obstacles" if solid.obstacles else "bodies")
 
 
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
@@ -259,7 +287,7 @@ def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fl
     coarsest = COARSEST_SPACING * min(domain.spacing)
     for body in solid.bodies:
         if body.spacing > coarsest:
-            path = ("solid", "bodies", body.name, "spacing")
+            path = (*_bodies_of(solid), body.name, "spacing")
             text = f"{body.spacing:.6g} m is too coarse for the fluid cells; expected at most {coarsest:.6g} m"
             yield Fault(path, f"{text}, {COARSEST_SPACING} of the smallest cell; half a cell is better")
 

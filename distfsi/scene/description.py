@@ -14,6 +14,7 @@ import numpy as np
 
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -178,11 +179,14 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
+
+    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
@@ -196,6 +200,7 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    obstacles: bool = False
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""

@@ -66,7 +66,10 @@ class Solid:
     body_force  that of the sources, over the sub-step
     work     (local blocks,) work [J] of the last step's external impulse
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
+    stands   whether no particle ever moves
     """
+
+    stands = False
 
     def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, device: Device):
         self.blocks, self.communicator, self.device = blocks, communicator, device
@@ -100,7 +103,11 @@ class Solid:
         c = self._own_particles(scene)
         self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
-        self._points.deform(self.columns, 0.0, device.zeros((self.count, D**2)))
+        self._begin()
+
+    def _begin(self) -> None:
+        """Collective. What materials and bonds find before the first step."""
+        self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
         self.form.bind(self.columns, self.exchange)
 
     def _constants(self) -> dict[str, object]:
