@@ -31,6 +31,7 @@ class Budget:
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
+            self.columns += [f"held by {share} [J]" for share in fluid.model.carried]
         self.columns += [f"left {name}" for name in self.conserved]
         if solid:
             self.columns += [
@@ -68,6 +69,9 @@ class Budget:
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.model.carried:
+                held = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
+                values |= {f"held by {share} [J]": energy for share, energy in held}
         if self.solid:
             totals = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])

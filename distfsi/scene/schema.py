@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
 from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
@@ -120,6 +121,10 @@ class FluidInput(Table):
     model: description.TwoPhaseModel = Field(
         "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
     )
+    detonation: DetonationInput | None = Field(
+        None, description="how the explosive burns and what lights it; default: its regions are given burnt"
+    )
+    afterburn: AfterburnSectionInput | None = Field(None, description="how its products burn with air; default not")
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
     )
