@@ -286,6 +286,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "domain",
             "time",
             "fluid",
+            "charges",
             "solid",
             "sources",
             "output",

@@ -48,6 +48,7 @@ SECTIONS = {
     "`[fluid.detonation]`": ("DetonationInput",),
     "`burn` of the detonation": _names(Burn),
     "`[[fluid.detonation.detonators]]`": ("PointDetonator", "LineDetonator", "PlaneDetonator"),
+    "`[[charges]]`": ("ChargeInput",),
     "`[fluid.afterburn]`": ("AfterburnSectionInput",),
     "`law` of the afterburn": _names(Afterburn),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),

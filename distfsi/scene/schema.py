@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.charges import ChargeInput
 from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
 from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
@@ -279,6 +280,7 @@ class Sections(Table):
     domain: DomainInput | None = None
     time: TimeInput | None = None
     fluid: FluidInput | None = None
+    charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()
