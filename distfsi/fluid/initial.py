@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -80,8 +81,9 @@ class InitialState:
             )
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
+                where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
-                    self._lay_over(field[(block, slice(None), *active)], state, part)
+                    self._lay_over(field[where], state, part)
 
     def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
         """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""

@@ -31,7 +31,7 @@ class Reactions:
         times = lighting_times(present(fluid.detonation), blocks) if fluid.detonation else blocks.allocate(1) - np.inf
         self.lighting = DualArray(device, times)
         self._changed = DualArray(device, np.zeros(blocks.local_count, np.int64))
-        self._grid, self._spacing = blocks.grid_on(device), max(blocks.grid.spacing[: blocks.grid.dimensions])
+        self._grid = blocks.grid_on(device)
         self._rows = blocks.local_count * int(np.prod(blocks.shape[:2]))
 
     def advance(self, state: Any, time: float, dt: float) -> np.ndarray:
@@ -40,5 +40,5 @@ class Reactions:
         self._changed.host()[:] = 0
         self._changed.changed()
         given = state, self.lighting.read, self._changed.device, self._grid
-        self.device.run(self.kernels.react, self._rows, *given, self._spacing, time, dt)
+        self.device.run(self.kernels.react, self._rows, *given, time, dt)
         return self._changed.host() > 0

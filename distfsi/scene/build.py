@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from distfsi.laws.law import Source
 from distfsi.laws.sources.gravity import Gravity
+from distfsi.narrowing import present
 from distfsi.scene.description import (
     Afterburn,
     Body,
@@ -23,6 +24,7 @@ from distfsi.scene.description import (
     Solid,
     Time,
 )
+from distfsi.scene.detonation_tables import DetonationInput
 from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.schema import (
     CouplingInput,
@@ -62,13 +64,13 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         Region(_state(region, phases, dimensions), region.shape.build() if region.shape else None)
         for region in given.regions
     )
-    inflow = tuple(
-        tuple(
-            _state(state, phases, dimensions) if (state := getattr(given.inflow, f"{axis}_{side}")) else None
-            for side in SIDES
-        )
-        for axis in AXES[:dimensions]
-    )
+
+    def at(axis: str, side: str) -> FluidState | None:
+        state = getattr(given.inflow, f"{axis}_{side}")
+        return _state(state, phases, dimensions) if state else None
+
+    low, high = SIDES
+    inflow = tuple((at(axis, low), at(axis, high)) for axis in AXES[:dimensions])
     return Fluid(
         phases,
         regions,
@@ -79,7 +81,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.riemann,
         given.model,
         given.sharpening,
-        _detonation(given, phases) if given.detonation else None,
+        _detonation(given.detonation, phases) if given.detonation else None,
         Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
     )
 
@@ -88,19 +90,19 @@ def _index(phases: tuple[Phase, ...], name: str) -> int:
     return [phase.name for phase in phases].index(name)
 
 
-def _detonation(given: FluidInput, phases: tuple[Phase, ...]) -> Detonation:
+def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation:
     """What the law leaves out follows from the equation of state."""
-    index, burn = _index(phases, given.detonation.phase), given.detonation.burn.build()
+    index, burn = _index(phases, given.phase), given.burn.build()
     found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
     burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
-    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonation.detonators))
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
 
 
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:
     index = _index(phases, given.phase)
     p = given.pressure
     if p is None:
-        p = pressure(phases[index].eos, given.density, given.energy)
+        p = pressure(phases[index].eos, given.density, present(given.energy))
     return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
 
 
@@ -126,8 +128,8 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
         for name, body in given.bodies.items()
     )
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
-    form = (given.objective_rate, given.form, given.zero_energy, given.artificial_stress)
-    return Solid(bodies, given.smoothing, *viscosity, *form)
+    form = (given.objective_rate, given.form)
+    return Solid(bodies, given.smoothing, *viscosity, *form, given.zero_energy, given.artificial_stress)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

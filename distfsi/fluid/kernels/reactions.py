@@ -46,8 +46,17 @@ def relaxed_fraction(U, released):
     return U[3 + DIMENSIONS]
 
 
+@helper
+def cell_size(block, grid: BlockGrid):
+    """The largest extent of the cells of a block [m]."""
+    size = grid.spacing[block, 0]
+    for d in static_range(1, DIMENSIONS):
+        size = max(size, grid.spacing[block, d])
+    return size
+
+
 @driver
-def react(begin, end, U, lighting, changed, grid: BlockGrid, spacing, time, dt):
+def react(begin, end, U, lighting, changed, grid: BlockGrid, time, dt):
     """Shares of all cells after a step of `dt` [s] that ends at `time` [s].
 
     lighting  (blocks, 1, Z, Y, X) float64 times [s]
@@ -58,6 +67,7 @@ def react(begin, end, U, lighting, changed, grid: BlockGrid, spacing, time, dt):
     cells = block_size(grid)
     for r in range(begin, end):
         block = block_of_row(r, grid)
+        size = cell_size(block, grid)
         j, k = index_of_row(r, grid)
         for i in range(cells_of_row(r, block, grid)):
             at = cell_at(block, i, j, k, grid)
@@ -68,7 +78,7 @@ def react(begin, end, U, lighting, changed, grid: BlockGrid, spacing, time, dt):
             if held > 0.0:
                 state = tuple(load(U, first + v * cells) for v in static_range(VARIABLES))
                 before = carried_shares(state)
-                shares = shares_after(state, time - load(lighting, at), spacing, dt)
+                shares = shares_after(state, time - load(lighting, at), size, dt)
                 fall = sum(abs(before[n] - shares[n]) for n in static_range(CARRIED))
                 if fall > 0.0:
                     fraction = relaxed_fraction(state, released_energy(state, shares))
