@@ -14,7 +14,7 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 from distfsi.scene.faults import Fault, Path
 from distfsi.scene.materials import Material, find, materials, unknown
 from distfsi.scene.units import to_si
-from distfsi.scene.values import Delay, Direction, Position, PositiveNumber, Table, quantity
+from distfsi.scene.values import Delay, Direction, Mass, Position, PositiveNumber, Table
 
 BURNS_AT_ONCE = "instant"
 
@@ -24,7 +24,7 @@ class ChargeInput(Table):
     one of that name."""
 
     material: str = Field(description="name of an explosive (`distfsi materials`)")
-    mass: quantity("kg", gt=0.0) = Field(description="its mass; of a hemisphere that of the half that is there")
+    mass: Mass = Field(description="its mass; of a hemisphere that of the half that is there")
     center: Position = Field(description="its center; of a hemisphere that of its flat side, on an end of the domain")
     shape: Literal["sphere", "hemisphere", "cylinder", "box"] = Field("sphere", description="its shape")
     axis: Direction = Field((0.0, 0.0, 1.0), description="of a cylinder: the direction of its axis")
