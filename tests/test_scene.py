@@ -292,6 +292,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "domain",
             "time",
             "fluid",
+            "charges",
             "solid",
             "sources",
             "output",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from distfsi.laws.law import Source
 from distfsi.laws.solid.eos.linear import LinearEos
@@ -10,8 +11,10 @@ from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.laws.sources.gravity import Gravity
 from distfsi.narrowing import present
 from distfsi.scene.description import (
+    Afterburn,
     Body,
     Coupling,
+    Detonation,
     Domain,
     Fluid,
     FluidState,
@@ -23,6 +26,7 @@ from distfsi.scene.description import (
     Solid,
     Time,
 )
+from distfsi.scene.detonation_tables import DetonationInput
 from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.motion import Motion
 from distfsi.scene.schema import (
@@ -36,6 +40,7 @@ from distfsi.scene.schema import (
     StateInput,
     TimeInput,
 )
+from distfsi.scene.shocks import chapman_jouguet
 from distfsi.scene.thermodynamics import pressure
 
 BLOCK_CELLS = ((512,), (128, 64), (64, 32, 32))
@@ -80,11 +85,25 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.riemann,
         given.model,
         given.sharpening,
+        _detonation(given.detonation, phases) if given.detonation else None,
+        Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
     )
 
 
+def _index(phases: tuple[Phase, ...], name: str) -> int:
+    return [phase.name for phase in phases].index(name)
+
+
+def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation:
+    """What the law leaves out follows from the equation of state."""
+    index, burn = _index(phases, given.phase), given.burn.build()
+    found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
+    burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+
+
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:
-    index = [phase.name for phase in phases].index(given.phase)
+    index = _index(phases, given.phase)
     p = given.pressure
     if p is None:
         p = pressure(phases[index].eos, given.density, present(given.energy))

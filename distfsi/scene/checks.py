@@ -27,6 +27,7 @@ from distfsi.scene.description import (
     Solid,
     Tube,
 )
+from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.law_tables import GaugeInput
 from distfsi.scene.packing import pack, uses_rings
@@ -109,6 +110,7 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+    yield from check_reactions(given, fluid)
 
 
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
@@ -125,6 +127,8 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
         yield Fault((*path, "density"), text)
         return
     cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
+    if fluid.detonation is not None and fluid.detonation.phase == state.phase:
+        cold_pressure = 0.0  # what is unburnt has no energy yet, and is no gas
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")

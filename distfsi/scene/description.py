@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn as AfterburnLaw
+from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
 from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
@@ -138,6 +139,52 @@ class Region:
 
 
 @dataclass(frozen=True)
+class PointDetonator:
+    """Lights the explosive from `position` [m] after `delay` [s]."""
+
+    position: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineDetonator:
+    """Lights it from all points of the line from `start` to `end` [m] at once, after `delay` [s]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlaneDetonator:
+    """Lights it from all of the plane through `point` [m] at once, after `delay` [s]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    delay: float = 0.0
+
+
+Detonator = PointDetonator | LineDetonator | PlaneDetonator
+
+
+@dataclass(frozen=True)
+class Detonation:
+    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+
+    phase: int
+    burn: Burn
+    detonators: tuple[Detonator, ...]
+
+
+@dataclass(frozen=True)
+class Afterburn:
+    """How the products, a phase, burn with air."""
+
+    phase: int
+    law: AfterburnLaw
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -150,6 +197,8 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    detonation: Detonation | None = None
+    afterburn: Afterburn | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

@@ -10,6 +10,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.charges import ChargeInput
+from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
 from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
@@ -123,6 +125,10 @@ class FluidInput(Table):
     model: description.TwoPhaseModel = Field(
         "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
     )
+    detonation: DetonationInput | None = Field(
+        None, description="how the explosive burns and what lights it; default: its regions are given burnt"
+    )
+    afterburn: AfterburnSectionInput | None = Field(None, description="how its products burn with air; default not")
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
     )
@@ -314,6 +320,7 @@ class Sections(Table):
     domain: DomainInput | None = None
     time: TimeInput | None = None
     fluid: FluidInput | None = None
+    charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()
