@@ -226,7 +226,7 @@ class Simulation:
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
     """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
-    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene))
+    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene), domain.coordinates)
     blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
     if scene.solid is None or costs is not None:
         return blocks

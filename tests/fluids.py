@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+from distfsi.coordinates.planar import PLANAR
 from distfsi.fluid.model import FluidModel, fluid_model
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
@@ -25,5 +26,5 @@ def model_of(
     """The model of a fluid made of `MATERIALS`, or of other laws."""
     phases = tuple(Phase(str(name), name if isinstance(name, FluidEos) else MATERIALS[name]) for name in names)
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
-    domain = SimpleNamespace(dimensions=dimensions)
+    domain = SimpleNamespace(dimensions=dimensions, coordinates=PLANAR)
     return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, sources=sources))

@@ -22,7 +22,7 @@ LAYERS = (
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},
-    {"gauges"},
+    {"gauges", "coordinates"},
     {"laws"},
     {"formulas"},
     {"errors", "narrowing", "__init__"},

@@ -178,7 +178,7 @@ class OneRank:
 
 @pytest.fixture
 def small_blocks():
-    grid = SimpleNamespace(dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0))
+    grid = SimpleNamespace(dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0), coordinates=PLANAR)
     return SimpleNamespace(grid=grid, block_cells=(4, 3, 1), origin=np.array([[0, 0, 0], [4, 0, 0]]))
 
 

@@ -13,6 +13,7 @@ from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageStep, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
+from distfsi.fluid.metrics import Metrics
 from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
 from distfsi.fluid.tiles import Tiling
@@ -65,7 +66,9 @@ class Fluid:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
         self._buffers = [DualArray(team, buffer) for buffer in buffers]
-        self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
+        self.metrics = Metrics(blocks, real)
+        sizes = team.tile_cells(scene.performance.tile_cells)
+        self.tiling = Tiling(blocks, team, sizes, model.conserved, self.metrics)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
@@ -304,6 +307,7 @@ class Fluid:
             if volume is not None:
                 part = self.active(volume, block).astype(np.float64)
                 cells = np.where(part > 0.0, part * cells, 0.0)
+            cells = self.metrics.weighted(cells, block)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
         return sums * self._cell_volume()
 

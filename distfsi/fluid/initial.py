@@ -56,7 +56,8 @@ class InitialState:
                 if region.shape is None:
                     cells[:] = new
                     continue
-                part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
+                spacing, coordinates = blocks.grid.spacing[:dimensions], blocks.grid.coordinates
+                part = cell_fractions(region.shape, centers, spacing, coordinates).reshape(cells.shape[1:])
                 mixed = part * new + (1.0 - part) * cells
                 if self.model.phases == 2:
                     cut = np.argwhere((part > 0.0) & (part < 1.0))

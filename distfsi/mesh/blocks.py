@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.device.interface import Device
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.curve import deal, morton_keys
@@ -38,9 +40,18 @@ class Grid:
     spacing: tuple[float, float, float]
     boundaries: tuple[tuple[str, str], ...]
     ghost_layers: int = GHOSTS
+    coordinates: Coordinates = PLANAR
 
     @classmethod
-    def of(cls, lower: tuple, upper: tuple, cells: tuple, boundaries: tuple, ghost_layers: int = GHOSTS) -> Grid:
+    def of(
+        cls,
+        lower: tuple,
+        upper: tuple,
+        cells: tuple,
+        boundaries: tuple,
+        ghost_layers: int = GHOSTS,
+        coordinates: Coordinates = PLANAR,
+    ) -> Grid:
         """The grid with the given values for each of its 1 to 3 dimensions."""
         unused = 3 - len(cells)
         return cls(
@@ -50,6 +61,7 @@ class Grid:
             spacing=(*((b - a) / n for a, b, n in zip(lower, upper, cells, strict=True)), *[1.0] * unused),
             boundaries=(*(tuple(pair) for pair in boundaries), *[("none", "none")] * unused),
             ghost_layers=ghost_layers,
+            coordinates=coordinates,
         )
 
     @property

@@ -8,6 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+
 
 class Origin(Protocol):
     """What a run goes on from: a state of this time [s] and step, and the last restart file, if there is one."""
@@ -51,6 +53,9 @@ class Grid(Protocol):
 
     @property
     def spacing(self) -> tuple[float, float, float]: ...
+
+    @property
+    def coordinates(self) -> Coordinates: ...
 
 
 class Blocks(Protocol):

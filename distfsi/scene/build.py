@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from distfsi.coordinates import coordinates_of
 from distfsi.laws.law import Source
 from distfsi.laws.sources.gravity import Gravity
 from distfsi.scene.description import (
@@ -43,7 +44,7 @@ ARRIVAL = 0.01  # of the ambient pressure
 def build_domain(given: DomainInput) -> Domain:
     """The box of cells."""
     boundaries = tuple(getattr(given, axis) for axis in AXES[: len(given.cells)])
-    return Domain(given.lower, given.upper, given.cells, boundaries)
+    return Domain(given.lower, given.upper, given.cells, boundaries, coordinates_of(given.symmetry))
 
 
 def build_time(given: TimeInput) -> Time:

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
 
@@ -21,7 +23,8 @@ Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "stairs", "paper"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
+Symmetry = Literal["planar", "axisymmetric", "cylindrical", "spherical"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -177,12 +180,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:

@@ -43,6 +43,12 @@ class DomainInput(Table):
     x: Ends = OUTFLOW
     y: Ends = OUTFLOW
     z: Ends = OUTFLOW
+    symmetry: description.Symmetry = Field(
+        "planar",
+        description='what turns about an axis or a point: "axisymmetric" (2D): x is the distance r from an axis, y the '
+        'place z along it; "cylindrical", "spherical" (1D): x is the distance r from an axis or a point. Totals are of '
+        'the whole turn, in "cylindrical" per metre along the axis. The end at r = 0 has the kind "axis"',
+    )
     gravity: Acceleration | None = Field(None, description="acceleration of everything; default none")
 
 

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Shape, Tube
 
 SUBPOINTS = 8  # per axis, in cells that a curved or oblique surface may cut
@@ -91,8 +93,10 @@ def volume(shape: Box | Ball | Tube | Cylinder) -> float:
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
 
 
-def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple[float, ...]) -> np.ndarray:
-    """Fraction of each cell of a grid that lies inside `shape`, shape ([nz,] [ny,] nx).
+def cell_fractions(
+    shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple[float, ...], coordinates: Coordinates = PLANAR
+) -> np.ndarray:
+    """Fraction of the volume of each cell of a grid that lies inside `shape`, shape ([nz,] [ny,] nx).
 
     `centers` holds the cell centers along each axis, `spacing` the cell sizes [m]. Exact for boxes; otherwise cells
     that the surface may cut are sampled at SUBPOINTS points per axis. A cell's value depends on its own center only,
@@ -101,12 +105,21 @@ def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple
     shape_of_grid = tuple(len(x) for x in reversed(centers))
     if _is_its_bounding_box(shape):
         lower, upper = bounding_box(shape)
-        return _outer_product([_overlap(*args) for args in zip(lower, upper, centers, spacing, strict=True)])
+        along = [_overlap(*args) for args in zip(lower, upper, centers, spacing, strict=True)]
+        if coordinates.radial:
+            along[0] = _overlap_in_r(lower[0], upper[0], centers[0], spacing[0], coordinates)
+        return _outer_product(along)
     grids = np.meshgrid(*reversed(centers), indexing="ij")
     points = np.stack([g.ravel() for g in reversed(grids)], axis=1)
     signed = distance(shape, points)
     fractions = (signed < 0.0).astype(np.float64)
     cut = np.flatnonzero(np.abs(signed) < 0.5001 * math.hypot(*spacing))
+    if coordinates.radial:
+        places = [points[cut] + offset for offset in _offsets(spacing)]
+        weights = np.array([coordinates.area(place[:, 0]) for place in places])
+        inside = np.array([contains(shape, place) for place in places])
+        fractions[cut] = (weights * inside).sum(axis=0) / weights.sum(axis=0)
+        return fractions.reshape(shape_of_grid)
     hits = sum(contains(shape, points[cut] + offset) for offset in _offsets(spacing))
     fractions[cut] = hits / SUBPOINTS ** len(centers)
     return fractions.reshape(shape_of_grid)
@@ -126,6 +139,16 @@ def _overlap(lower: float, upper: float, centers: np.ndarray, spacing: float) ->
     low = np.maximum((lower - centers) / spacing, -0.5)
     high = np.minimum((upper - centers) / spacing, 0.5)
     fraction = np.maximum(high - low, 0.0)
+    return np.where(fraction > 1.0 - 1e-9, 1.0, np.where(fraction < 1e-9, 0.0, fraction))
+
+
+def _overlap_in_r(
+    lower: float, upper: float, centers: np.ndarray, spacing: float, coordinates: Coordinates
+) -> np.ndarray:
+    """Fraction of the volume of each interval of length `spacing` about `centers` that lies in [lower, upper]."""
+    low, high = centers - 0.5 * spacing, centers + 0.5 * spacing
+    inside = coordinates.volume(np.clip(lower, low, high), np.clip(upper, low, high))
+    fraction = inside / coordinates.volume(low, high)
     return np.where(fraction > 1.0 - 1e-9, 1.0, np.where(fraction < 1e-9, 0.0, fraction))
 
 
