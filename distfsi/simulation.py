@@ -77,19 +77,23 @@ class Simulation:
         threads: int | None = None,
         costs: np.ndarray | None = None,
         device: Device | None = None,
+        resumed: bool = False,
     ) -> Simulation:
         """Build the parts the scene needs, and no others.
 
-        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
+        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads; `resumed`: a
+        snapshot will be restored.
         """
         blocks = deal_blocks(scene, communicator, costs)
         device = device or Team(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if scene.fluid else None
         solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupled = COUPLINGS[scene.coupling.scheme]
         coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        if fluid and fluid.mapping:
+            simulation.time = fluid.mapping.time
         if scene.output.peaks:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)

@@ -19,6 +19,7 @@ from launch import ROOT
 PLANE = """
 title = "at rest"
 [domain]
+symmetry = "{symmetry}"
 lower = [0, 0]
 upper = [{cells[0]}, {cells[1]}]
 cells = {cells}
@@ -136,6 +137,7 @@ def plane(**given):
     values = {
         "cells": [64, 44], "x": ["outflow", "wall"], "steps": 24, "scheme": "rk3", "inflow": "", "velocity": [0, 0],
         "pressure": 20, "center": [27.5, 8.5], "block": [16, 12], "tile": [8, 4],
+        "symmetry": "planar",
     }  # fmt: skip
     return PLANE.format(**values | given)
 
@@ -148,6 +150,9 @@ SCENES = {
     "periodic": plane(x=["periodic", "periodic"], center=[2, 40], steps=16),
     "inflow": plane(x=["inflow", "outflow"], inflow=STREAM, pressure=1),
     "stream": plane(x=["periodic", "periodic"], velocity=[0.3, 0]),
+    "axis": plane(symmetry="axisymmetric", x=["axis", "wall"]),
+    "along the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[-0.0, 0.3]),
+    "away from the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[0.3, 0]),
     "falling": FALLING,
     "space": SPACE,
     "interface": INTERFACE,

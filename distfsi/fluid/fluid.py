@@ -13,6 +13,7 @@ from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageStep, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
+from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.metrics import Metrics
 from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
@@ -49,10 +50,11 @@ class Fluid:
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
     step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
-    cells; of the others.
+    cells; of the others. mapping: what another run has left here, if this one goes on from it.
     """
 
-    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device, resumed: bool = False):
+        """`resumed`: its state will be that of a snapshot, so nothing is mapped."""
         self.model, self.blocks, self.team = model, blocks, team
         self.stages = SCHEMES[scene.time.scheme]
         self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
@@ -64,7 +66,10 @@ class Fluid:
         self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
-        initial.paint(blocks, buffers[0])
+        self.mapping = Mapping(given.map, scene, blocks) if given.map and not resumed else None
+        initial.paint(blocks, buffers[0], self.mapping)
+        if self.mapping:
+            self.mapping.sum_up()
         self._buffers = [DualArray(team, buffer) for buffer in buffers]
         self.metrics = Metrics(blocks, real)
         sizes = team.tile_cells(scene.performance.tile_cells)

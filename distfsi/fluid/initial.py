@@ -7,6 +7,7 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
 from distfsi.scene.description import Fluid, FluidState
@@ -42,9 +43,10 @@ class InitialState:
         fraction = [] if self.model.phases == 1 else [self._fraction(state)]
         return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
 
-    def paint(self, blocks: Blocks, field: np.ndarray) -> None:
+    def paint(self, blocks: Blocks, field: np.ndarray, mapping: Mapping | None = None) -> None:
         """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part
-        holds that part of the region's mass, momentum and energy; two materials have come to one pressure in it."""
+        holds that part of the region's mass, momentum and energy; two materials have come to one pressure in it.
+        What is mapped comes over the first region."""
         dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
         states = [self.of(region.state) for region in self.fluid.regions]
         for block in range(blocks.local_count):
@@ -55,6 +57,8 @@ class InitialState:
                 new = state[:, None, None, None]
                 if region.shape is None:
                     cells[:] = new
+                    if mapping:
+                        mapping.apply(block, cells)
                     continue
                 spacing, coordinates = blocks.grid.spacing[:dimensions], blocks.grid.coordinates
                 part = cell_fractions(region.shape, centers, spacing, coordinates).reshape(cells.shape[1:])

@@ -1,7 +1,7 @@
-"""How much of balls and discs about the origin lies in cells: exact volumes, so that what is mapped is conserved.
+"""How much of spheres and discs about the origin lies in cells: exact volumes, so that what is mapped is conserved.
 
-Each function gives the volume between the origin and a corner; that of a cell is their sum over its corners, with signs.
-So neighbours share what they leave each other to the bit, and all cells together hold what their outermost corners hold.
+Each function gives the volume between the origin and a corner; that of a cell is their sum over its corners, with
+signs. So neighbours share what they leave each other to the bit, and all cells hold what the outermost corners hold.
 """
 
 from __future__ import annotations

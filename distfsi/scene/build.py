@@ -13,6 +13,7 @@ from distfsi.scene.description import (
     Domain,
     Fluid,
     FluidState,
+    Map,
     Output,
     Peaks,
     Performance,
@@ -26,6 +27,7 @@ from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
+    MapInput,
     OutputInput,
     PerformanceInput,
     SolidInput,
@@ -76,7 +78,12 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.riemann,
         given.model,
         given.sharpening,
+        _map(given.map, dimensions) if given.map else None,
     )
+
+
+def _map(given: MapInput, dimensions: int) -> Map:
+    return Map(given.run, given.center or (0.0,) * dimensions, AXES.index(given.axis))
 
 
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:

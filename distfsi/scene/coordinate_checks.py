@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path as File
 
 from distfsi.coordinates import Coordinates
 from distfsi.laws.registry import laws_of, word_of
-from distfsi.scene.description import Domain, Fluid, Solid
+from distfsi.scene.description import Domain, Fluid, Map, Solid
 from distfsi.scene.faults import Fault
 from distfsi.scene.schema import Sections
 
@@ -23,6 +24,8 @@ def check_coordinates(sections: Sections, domain: Domain, fluid: Fluid | None, s
         yield Fault(path, text)
         return
     yield from _check_axis(domain)
+    if fluid is not None and fluid.map is not None:
+        yield from _check_map(fluid.map, domain)
     if not coordinates.radial:
         return
     if solid is not None:
@@ -55,6 +58,16 @@ def _check_axis(domain: Domain) -> Iterator[Fault]:
         yield Fault(("domain", "lower"), f"{domain.lower[0]:g} m along r; expected at least 0")
     if domain.cells[0] < FEWEST_CELLS:
         yield Fault(("domain", "cells"), f"expected at least {FEWEST_CELLS} along r")
+
+
+def _check_map(given: Map, domain: Domain) -> Iterator[Fault]:
+    """The other run has left something, and its axis is that of this one."""
+    path = File(given.run)
+    if not path.is_file() and not any(path.glob("restart-[0-9]*.h5")):
+        text = f"{path} is no restart file and has none; a finished run in radial coordinates leaves one"
+        yield Fault(("fluid", "map", "run"), text)
+    if domain.coordinates.radial and given.center[0] != 0.0:
+        yield Fault(("fluid", "map", "center"), "lies beside the axis of this scene; expected r = 0")
 
 
 def _accelerations(sections: Sections) -> Iterator[tuple[tuple[str, ...], tuple[float, ...]]]:

@@ -24,7 +24,6 @@ Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "stairs", "paper"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
-Symmetry = Literal["planar", "axisymmetric", "cylindrical", "spherical"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -110,6 +109,16 @@ class Region:
 
 
 @dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -122,6 +131,7 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

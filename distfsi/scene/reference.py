@@ -44,6 +44,7 @@ SECTIONS = {
     "`[fluid]`": ("FluidInput",),
     "`[fluid.phases.NAME]`": _names(FluidEos),
     "`[[fluid.regions]]`": ("RegionInput",),
+    "`[fluid.map]`": ("MapInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
