@@ -115,9 +115,9 @@ def cell_fractions(
     fractions = (signed < 0.0).astype(np.float64)
     cut = np.flatnonzero(np.abs(signed) < 0.5001 * math.hypot(*spacing))
     if coordinates.radial:
-        places = [points[cut] + offset for offset in _offsets(spacing)]
-        weights = np.array([coordinates.area(place[:, 0]) for place in places])
-        inside = np.array([contains(shape, place) for place in places])
+        sampled = [points[cut] + offset for offset in _offsets(spacing)]
+        weights = np.array([coordinates.area(each[:, 0]) for each in sampled])
+        inside = np.array([contains(shape, each) for each in sampled])
         fractions[cut] = (weights * inside).sum(axis=0) / weights.sum(axis=0)
         return fractions.reshape(shape_of_grid)
     hits = sum(contains(shape, points[cut] + offset) for offset in _offsets(spacing))
