@@ -86,7 +86,7 @@ enum { LOW, HIGH, VOLUME, NEARNESS, TO_LOW, STRETCH };
 struct Metrics {
     const real *values;
     long long size;
-    DEVICE real operator()(int row, int i) const { return values[row * size + i]; }
+    __device__ __forceinline__ real operator()(int row, int i) const { return values[row * size + i]; }
 };
 
 // Area of face i of a row on a domain side, over that of a planar face; nx: cells of the tile along x.
