@@ -151,7 +151,7 @@ SCENES = {
     "inflow": plane(x=["inflow", "outflow"], inflow=STREAM, pressure=1),
     "stream": plane(x=["periodic", "periodic"], velocity=[0.3, 0]),
     "axis": plane(symmetry="axisymmetric", x=["axis", "wall"]),
-    "along the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[-0.0, 0.3]),
+    "along the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[-0.0, 0.3], steps=10),
     "away from the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[0.3, 0]),
     "falling": FALLING,
     "space": SPACE,

@@ -78,8 +78,8 @@ def test_rest_stays_to_the_bit(symmetry, precision):
 
 @pytest.mark.parametrize("model", ["six_equation", "five_equation"])
 def test_an_oblique_interface_stays_at_rest(model):
-    """Water and air under one pressure, 1000 steps: to the rounding of the water's 6e8 Pa, as in planar coordinates. That
-    is 1e-12 of pressure and sound speed of water, but 1e-11 of what air's volume makes of it."""
+    """Water and air under one pressure, 1000 steps: to the rounding of the water's 6e8 Pa, as in planar coordinates.
+    That is 1e-12 of pressure and sound speed of water, but 1e-11 of what air's volume makes of it."""
     water = Region(FluidState(1, 1000.0, 1e5, (0.0, 0.0)), HalfSpace((8.0, 5.0), (1.0, 2.0)))
     regions = (Region(FluidState(0, 1.2, 1e5, (0.0, 0.0)), None), water)
     simulation = start(walled("axisymmetric", regions, (16, 12), (AIR, WATER), model=model, **SHARP))

@@ -76,10 +76,11 @@ class Mapping:
         self._run = run = FinishedRun(given.run, scene)
         self.time = run.time
         coordinates, D = blocks.grid.coordinates, blocks.grid.dimensions
-        self._shells = shells = shells_of(run.coordinates, coordinates, D, given.axis)
+        shells = shells_of(run.coordinates, coordinates, D, given.axis)
         if shells is None:
             kinds = type(run.coordinates).__name__.lower(), type(coordinates).__name__.lower()
             raise InputError([f"fluid.map.run: {kinds[0]} in {given.run}; that does not fit into {D}D, {kinds[1]}"])
+        self._shells = shells
         self._sums = np.zeros((blocks.local_count, run.rows - run.fractions))
         low, high = np.array([blocks.grid.lower[:D]]), np.array([blocks.grid.upper[:D]])
         contents = self._contents(*(corner - np.array(given.center) for corner in (low, high)))
@@ -115,7 +116,8 @@ class Mapping:
         cells[:] = flat.reshape(len(cells), *shape)
         # what has arrived, from the new states
         got = (new - rest) * volume[touched]
-        radial = sum(got[P + axis] * directions[:, axis] for axis in self._shells.across)
+        across = list(self._shells.across)
+        radial = (got[[P + axis for axis in across]] * directions[:, across].T).sum(axis=0)
         axial = [got[P + self._along].sum()] if run.layers is not None else []
         self._sums[block] = [*got[:P].sum(axis=1), radial.sum(), *axial, got[P + D].sum()]
 
@@ -167,11 +169,12 @@ class Mapping:
         parts = shell_parts(shells.volume, low[:, across], high[:, across], run.edges)
         if shells.along is None:
             return (parts @ run.contents[:, 0].T).T
+        along = shells.along
         if run.layers is None:
-            return (parts @ run.contents[:, 0].T).T * (high - low)[:, shells.along]
+            return (parts @ run.contents[:, 0].T).T * (high - low)[:, along]
         found = np.zeros((len(run.contents), len(low)))
         for layer, (bottom, top) in enumerate(zip(run.layers[:-1], run.layers[1:], strict=True)):
-            height = np.minimum(high[:, shells.along], top) - np.maximum(low[:, shells.along], bottom)
+            height = np.minimum(high[:, along], top) - np.maximum(low[:, along], bottom)
             inside = np.flatnonzero(height > 0.0)
             found[:, inside] += (parts[inside] @ run.contents[:, layer].T).T * height[inside]
         return found
@@ -182,16 +185,15 @@ def shell_parts(volume: overlaps.CornerVolume, low: np.ndarray, high: np.ndarray
     array (cells, shells)."""
     from scipy.sparse import csr_array
 
-    corners = low.T, high.T
     nearest = np.sqrt((np.maximum(np.maximum(low, -high), 0.0) ** 2).sum(axis=1))
     farthest = np.sqrt((np.maximum(np.abs(low), np.abs(high)) ** 2).sum(axis=1))
-    full = overlaps.in_cells(volume, *corners, 4.0 * (farthest.max() + edges[-1]))
+    full = overlaps.in_cells(volume, low.T, high.T, 4.0 * (farthest.max() + edges[-1]))
     inside = np.zeros(len(low))
     cells, shells, parts = [], [], []
     for shell, radius in enumerate(edges):
         before, inside = inside, np.where(farthest <= radius, full, 0.0)
         cut = np.flatnonzero((nearest < radius) & (farthest > radius))
-        inside[cut] = overlaps.in_cells(volume, *(corner[:, cut] for corner in corners), radius)
+        inside[cut] = overlaps.in_cells(volume, low[cut].T, high[cut].T, radius)
         if shell == 0:
             continue
         part = inside - before

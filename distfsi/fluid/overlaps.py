@@ -6,7 +6,7 @@ signs. So neighbours share what they leave each other to the bit, and all cells 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -68,9 +68,9 @@ def disc_to_circle(r: Array, radius: float) -> Array:
     return np.pi * np.minimum(r, radius) ** 2
 
 
-def in_cells(volume: CornerVolume, low: Sequence[Array], high: Sequence[Array], radius: float) -> Array:
-    """The part (n,) of a ball or disc in n cells between their corners `low` and `high`, an array (n,) per axis."""
-    total = np.zeros(len(low[0]))
+def in_cells(volume: CornerVolume, low: Array, high: Array, radius: float) -> Array:
+    """The part (n,) of a ball or disc in n cells between their corners `low` and `high` (axes, n)."""
+    total = np.zeros(low.shape[1])
     for corner in product((0, 1), repeat=len(low)):
         sign = (-1.0) ** (len(low) - sum(corner))
         total += sign * volume(*(high[d] if end else low[d] for d, end in enumerate(corner)), radius)
