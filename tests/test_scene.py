@@ -301,7 +301,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
         (["domain.upper=0"], "domain.upper (--set): must be greater than lower along x"),
         (['domain.x=["periodic", "wall"]'], "domain.x (--set): one end is periodic; expected both or none"),
         (['domain.x=["wall"]'], "domain.x.1 (--set): is missing; expected one of 'wall', 'symmetry', 'outflow', "
-         "'inflow', 'periodic'"),
+         "'inflow', 'periodic', 'axis'"),
         (["domain.x=wall"], 'domain.x (--set): "wall"; expected a list'),
         (['domain.y=["wall", "wall"]'], "domain.y (--set): the domain has 1 dimension(s), so no y ends"),
         (['domain.x=["inflow", "wall"]'], "fluid.inflow.x_low: is missing: the low x end of the domain is 'inflow'"),
