@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.cuda import NoGpu, gpu_of
 from distfsi.device.interface import Device
 from distfsi.device.native import compilation
@@ -97,12 +97,14 @@ def run(
     if restart is None:
         set_aside(directory, communicator)
     progress = Progress(scene.time.end, communicator)
+    for note in scene.notes:
+        progress.say(note)
     threads = threads or threads_of_rank(communicator)
-    device = gpu_of_rank(communicator, direct) if on_gpu else Team(threads)
+    device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None
     performance = Performance(parts_of(scene), timers, communicator)
     journal = Journal(directory, scene, communicator, threads, performance.sums)
-    with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
+    with requests, closing(progress), threadpool_limits(1), journal, compilation.announced(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device, resumed=origin is not None)
             simulation.requested, simulation.timers = requests.strongest, timers

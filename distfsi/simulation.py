@@ -13,7 +13,7 @@ import psutil
 from distfsi.coupling.cut_cells.cut_cells import CutCells
 from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
 from distfsi.coupling.protocol import Coupling, ReleasesFluid
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
 from distfsi.diagnostics.derived import DerivedFields
@@ -31,7 +31,7 @@ from distfsi.scene.packing import pack
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
-COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": ImmersedBoundary}
+COUPLINGS = {"cut_cells": CutCells, "staircase": CutCells, "immersed_boundary": ImmersedBoundary}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
@@ -85,7 +85,7 @@ class Simulation:
         snapshot will be restored.
         """
         blocks = deal_blocks(scene, communicator, costs)
-        device = device or Team(threads or threads_of_rank(communicator))
+        device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if scene.fluid else None
         solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None

@@ -55,12 +55,12 @@ def test_cells_of_kernels_are_those_of_the_blocks(dimensions, layers):
     D, cells = dimensions, (7, 5, 4)[:dimensions]
     lower, upper = (-1.0, 0.5, 2.0)[:D], (0.4, 3.0, 2.7)[:D]
     grid = Grid.of(lower, upper, cells, (("wall", "wall"),) * D, layers)
-    blocks, team = Blocks(grid, (3, 2, 2)[:D], Communicator()), cpu.Team(1)
+    blocks, device = Blocks(grid, (3, 2, 2)[:D], Communicator()), cpu.Cpu(1)
     shape, rows = (blocks.local_count, *blocks.shape), blocks.local_count * blocks.shape[0] * blocks.shape[1]
     count = int(np.prod(shape))
     center, number, inside, size = np.full((count, D), np.nan), np.full(count, -1), np.zeros(count), np.zeros(count)
     built = cpu.build([look_at_rows], {"DIMENSIONS": D, "GHOSTS": layers})
-    team.run(built.look_at_rows, rows, center, number, inside, size, blocks.grid_on(team), blocks.table_on(team))
+    device.run(built.look_at_rows, rows, center, number, inside, size, blocks.grid_on(device), blocks.table_on(device))
     active = np.zeros(shape, bool)
     for b in range(blocks.local_count):
         z, y, x = (slice(g, g + n) for g, n in zip(grid.ghosts[::-1], blocks.extent[b][::-1], strict=True))

@@ -333,21 +333,21 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
     assert all(np.abs(made).max() < 1e-13 for made in case.coupling.budget_by_cause().values())
 
 
-def test_stairs_push_a_plate_of_one_cell():
-    """Its particles are up to half a cell farther from where stairs close cells than from where cut cells are cut."""
+def test_a_staircase_pushes_a_plate_of_one_cell():
+    """Its particles are up to half a cell farther from where it closes cells than from where cut cells are cut."""
     plate = body(Box((0.5,), (0.6,)), 0.025, 100.0, (0.0,), stiffness=1.0)
     regions = [(gas(1.4, 1.0, (0.0,)), None), (gas(1.4, 10.0, (0.0,)), Box((0.0,), (0.45,)))]
-    case = Coupled([plate], regions, (0.0,), (1.0,), (10,), (("wall", "wall"),), scheme="stairs")
+    case = Coupled([plate], regions, (0.0,), (1.0,), (10,), (("wall", "wall"),), scheme="staircase")
     for _ in range(12):
         dt, impulse = case.step()
     assert impulse[0] / dt > 5.0  # the pressures are 10 and 1 at the start
     assert np.abs(case.coupling.budget_by_cause()["wall"]).max() < 1e-12
 
 
-def test_stairs_keep_uniform_flow_and_all_books():
+def test_a_staircase_keeps_uniform_flow_and_the_budget():
     """Whole cells only, as a scheme to compare with."""
     n, u = 24, (1.0, 0.5)
-    ball, method = rigid(Ball((0.4, 0.4), 0.2), 0.5 / n, u), {"scheme": "stairs", "cfl": 0.5}
+    ball, method = rigid(Ball((0.4, 0.4), 0.2), 0.5 / n, u), {"scheme": "staircase", "cfl": 0.5}
     carried = Coupled([ball], [(gas(1.4, 1.0, u), None)], (0.0, 0.0), (1.0, 1.0), (n, n), (OPEN,) * 2, **method)
     ball = body(Ball((0.5, 0.4), 0.2), 0.025, 3.0, (0.7, 0.3))
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 5.0, (0, 0)), Box((0.0, 0.0), (0.2, 0.2)))]
@@ -509,9 +509,7 @@ def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(sqrt(ratio), ratio, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
-    case = coupled(
-        [plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian"
-    )  # fmt: skip
+    case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian")
     c = case.solid.columns
     c["velocity"][:, 1] = 0.6 * np.sign(c["position"][:, 1] - 0.48)
     before, passed = case.balance(), False
@@ -860,9 +858,17 @@ def test_an_exponential_wave_in_water_throws_a_plate_as_taylor_says(psi):
     plate = body(Box((0.0,), (thickness,)), 0.5 * h, mass / thickness, (0,), stiffness=mass / thickness * sound**2)
     water = (gas(rho, base, (0,), 1), Box((low,), (0.5 * thickness,)))
     case = coupled(
-        [plate], [(gas(1.2, base, (0,)), None), water], (low,), (low + n * h,), (n,), (OPEN,), block=n, phases=phases,
-        cfl=0.5, runge_kutta="rk2",
-    )  # fmt: skip
+        [plate],
+        [(gas(1.2, base, (0,)), None), water],
+        (low,),
+        (low + n * h,),
+        (n,),
+        (OPEN,),
+        block=n,
+        phases=phases,
+        cfl=0.5,
+        runge_kutta="rk2",
+    )
     x, front = low + (np.arange(n) + 0.5) * h, -6 * h
     over = np.where(x < front, peak * np.exp((x - front) / (c * theta)), 0.0)
     W = primitives(case)[:, 0, 0]

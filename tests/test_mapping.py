@@ -5,12 +5,11 @@ import pytest
 
 from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
-from distfsi.fluid import overlaps
 from distfsi.fluid.mapping import shell_parts
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, series
 from distfsi.run import run
-from distfsi.scene import load
+from distfsi.scene import load, overlaps
 from distfsi.simulation import Simulation
 from tubes import advance, fields, radii
 

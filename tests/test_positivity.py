@@ -40,7 +40,7 @@ def falling_in(dimensions, cells, cfl, end=0.6, **method):
             (("symmetry", "outflow"),) * D,
             cfl,
             **method,
-        )  # fmt: skip
+        )
     )
     blocks, fluid = simulation.blocks, simulation.fluid
     for block in range(blocks.local_count):

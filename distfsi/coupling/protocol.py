@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Stage
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.blocks import Snapshot
 
 
@@ -28,7 +28,7 @@ class Coupling(Protocol):
     it: the `geometry` of the step, the `cells` of the stage, the `transfer`; what is in them is the coupling's alone,
     but for `transfer.impulse`. All else may be asked for between steps.
 
-    team       the device, whose seconds are those of the coupling alone
+    device     the device, whose seconds are those of the coupling alone
     reach      [m]: how far the solid's ghosts and images must go
     sub_steps  how many sub-steps of the solid a step has at most
     stray      [m]: how far particles may go between two migrations, if there are sub-steps
@@ -37,7 +37,7 @@ class Coupling(Protocol):
                coupling/kernels/cells.py
     """
 
-    team: Device
+    device: Device
     reach: float
     sub_steps: int
     stray: float

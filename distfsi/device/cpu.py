@@ -13,10 +13,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from distfsi.device.cache import cache_directory
-from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.native import Native
+from distfsi.device.source import Bound, NotInSubset
 
-__all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
+__all__ = ["Bound", "NotInSubset", "Cpu", "build", "cache_directory"]
 
 
 def build(
@@ -34,7 +34,7 @@ def build(
     return SimpleNamespace(**{d.__name__: Native(d, constants, bindings or {}, real) for d in drivers})
 
 
-class Team:
+class Cpu:
     """Threads of one rank that share the items of a driver call: the CPU as a device (device/interface.py).
 
     seconds: how long the calls have taken so far
@@ -49,11 +49,11 @@ class Team:
         self.threads, self.seconds = max(1, threads), 0.0
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
-    def with_own_clock(self) -> Team:
+    def with_own_clock(self) -> Cpu:
         """The same threads, whose seconds are counted apart."""
-        team = copy(self)
-        team.seconds = 0.0
-        return team
+        same = copy(self)
+        same.seconds = 0.0
+        return same
 
     def run(self, kernel: Callable, count: int, *arguments) -> None:
         """Call `kernel(begin, end, *arguments)` on ranges that together cover 0 … count."""

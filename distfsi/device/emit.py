@@ -14,20 +14,10 @@ from functools import partial
 import numpy as np
 
 from distfsi.device import markers
-from distfsi.device.fold import (
-    NUMBERS,
-    Bound,
-    Callee,
-    Changing,
-    Fold,
-    NotInSubset,
-    Number,
-    Source,
-    copied,
-    given,
-    is_fixed,
-    literal,
-)
+from distfsi.device.expressions import NUMBERS
+from distfsi.device.fold import Fold
+from distfsi.device.source import Bound, Callee, NotInSubset, Source
+from distfsi.device.trees import Changing, Number, copied, given, is_fixed, literal
 from distfsi.formulas.subset import Varying
 
 
@@ -35,14 +25,14 @@ class _Numbered(ast.NodeTransformer):
     """Each Number, changing or not, becomes an item of the tuple of numbers."""
 
     def __init__(self, numbers: dict[str, float | Varying]):
-        self.numbers, self.places, self.found = numbers, list(numbers), False
+        self.numbers, self.positions, self.found = numbers, list(numbers), False
 
     def visit_Number(self, node: Number | Changing) -> ast.expr:
         self.found = True
         if node.id not in self.numbers:
             self.numbers[node.id] = node.value
-            self.places.append(node.id)
-        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
+            self.positions.append(node.id)
+        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.positions.index(node.id)), ast.Load())
 
     visit_Changing = visit_Number
 
@@ -61,6 +51,26 @@ class Numbers:
     def _now(self) -> tuple[float, ...]:
         values = (number.value if isinstance(number, Varying) else number for number in self._numbers)
         return tuple(map(self._real, values))
+
+
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound | type]) -> dict[str, float | Varying]:
+    """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
+    found: dict[str, float | Varying] = {}
+
+    def put(value: object, label: str) -> None:
+        if isinstance(value, tuple):
+            for k, item in enumerate(value):
+                put(item, f"{label}[{k}]")
+        elif isinstance(value, (float, Varying)):
+            found[label] = value
+
+    for name, value in constants.items():
+        put(value, name)
+    for word, bound in bindings.items():
+        if isinstance(bound, Bound):
+            for name, value in bound.constants.items():
+                put(value, f"{bound.owner or word}.{name}")
+    return found
 
 
 @dataclass
@@ -84,7 +94,7 @@ class Emission:
         source = Source(function, self._records() | ({"self": law} if law else {}))
         name = source.name + suffix
         if name in self.functions:
-            raise NotInSubset(f"{source.place}: {name} is also the name of {self.functions[name][0].place}")
+            raise NotInSubset(f"{source.location}: {name} is also the name of {self.functions[name][0].location}")
         self.functions[name] = source, ast.FunctionDef()  # its name is taken
         lookup, call = (partial(find, source, scope, suffix) for find in (self._constant, self._callee))
         fold = Fold(source, lookup, call)
@@ -164,16 +174,16 @@ def callees_first(
     """Only what the `roots`, by default the last of the functions, still call after folding: callees first."""
     ordered: dict[str, tuple[Source, ast.FunctionDef]] = {}
 
-    def place(name: str) -> None:
+    def arrange(name: str) -> None:
         if name in ordered or name not in functions:
             return
         for node in ast.walk(functions[name][1]):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                place(node.func.id)
+                arrange(node.func.id)
         ordered[name] = functions[name]
 
     for root in [next(reversed(functions))] if roots is None else roots:
-        place(root)
+        arrange(root)
     return list(ordered.values())
 
 

@@ -13,11 +13,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from distfsi.device.fold import Bound
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.device.source import Bound
 
 TILE_CELLS = ((256,), (32, 8), (16, 8, 16))
-MOST_THREADS = 256
+MAXIMUM_THREADS = 256
 
 
 class Queue(Enum):
@@ -82,7 +82,7 @@ class Gpu:
         return gpu
 
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
-        fits = np.prod(wanted[:2]) <= MOST_THREADS  # one thread per column along the third axis
+        fits = np.prod(wanted[:2]) <= MAXIMUM_THREADS  # one thread per column along the third axis
         return wanted if fits else TILE_CELLS[len(wanted) - 1]
 
     def build(

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 
 
 class Device(Protocol):

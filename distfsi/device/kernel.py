@@ -10,8 +10,8 @@ import numpy as np
 
 from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, numbers_of, text_by_hand
 from distfsi.device.emit import Numbers
-from distfsi.device.fold import Bound, flat_values, parameters_of
 from distfsi.device.markers import ByHand
+from distfsi.device.source import Bound, flat_values, parameters_of
 
 
 @dataclass(frozen=True)

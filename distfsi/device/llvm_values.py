@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from distfsi.device.exponential import EXPONENTIALS
-from distfsi.device.fold import NotInSubset, Source
 from distfsi.device.llvm_types import (
     BOOL,
     INTEGER,
@@ -23,6 +22,7 @@ from distfsi.device.llvm_types import (
     packed_type,
     parts_of,
 )
+from distfsi.device.source import NotInSubset, Source
 
 # what modules may call; `fabs` and `abs` are those of reals and integers
 DECLARED = [f"declare double @llvm.{word}.f64(double)" for word in ("sqrt", "log", "fabs", "floor")]
@@ -40,7 +40,7 @@ class Values:
         self.block, self.ended, self.count = "entry", False, 0
 
     def refuse(self, why: str) -> NotInSubset:
-        return NotInSubset(f"{self.source.place}, {self.source.function.__name__}: {why}")
+        return NotInSubset(f"{self.source.location}, {self.source.function.__name__}: {why}")
 
     # ---- text --------------------------------------------------------------------------------------------------------
 
@@ -173,21 +173,21 @@ class Values:
     def item(self, whole: Value, k: int) -> Value:
         return self.get(whole, [str(k)]) if isinstance(whole.type, Array) else parts_of(whole)[k]
 
-    def address(self, array: Value, places: Sequence[str]) -> str:
+    def address(self, array: Value, indices: Sequence[str]) -> str:
         data, *lengths = array.leaves
-        flat = places[0]
-        for place, length in zip([*places[1:], *["0"] * (len(lengths) - len(places))], lengths[1:], strict=True):
+        flat = indices[0]
+        for index, length in zip([*indices[1:], *["0"] * (len(lengths) - len(indices))], lengths[1:], strict=True):
             flat = self.new(f"mul i64 {flat}, {length}")
-            flat = flat if place == "0" else self.new(f"add i64 {flat}, {place}")
+            flat = flat if index == "0" else self.new(f"add i64 {flat}, {index}")
         return self.new(f"getelementptr inbounds {STORED[array.type.element]}, ptr {data}, i64 {flat}")
 
-    def get(self, array: Value, places: Sequence[str]) -> Value:
-        """A value of an array, or with fewer places than axes the array of the rest."""
+    def get(self, array: Value, indices: Sequence[str]) -> Value:
+        """A value of an array, or with fewer indices than axes the array of the rest."""
         element, axes = array.type.element, array.type.axes
-        if len(places) < axes:
-            rest = array.leaves[1 + len(places) :]
-            return Value(Array(element, axes - len(places)), (self.address(array, places), *rest))
-        return self.loaded(element, self.address(array, places))
+        if len(indices) < axes:
+            rest = array.leaves[1 + len(indices) :]
+            return Value(Array(element, axes - len(indices)), (self.address(array, indices), *rest))
+        return self.loaded(element, self.address(array, indices))
 
     def loaded(self, element: str, address: str) -> Value:
         stored = STORED[element]
@@ -209,9 +209,9 @@ class Values:
             leaf = leaf if stored == INTEGER else self.new(f"trunc i64 {leaf} to {stored}")
         self.line(f"store {stored} {leaf}, ptr {address}")
 
-    def flat_address(self, array: Value, place: Value) -> str:
+    def flat_address(self, array: Value, index: Value) -> str:
         stored = STORED[array.type.element]
-        return self.new(f"getelementptr inbounds {stored}, ptr {array.leaves[0]}, i64 {self.scalar(place, INTEGER)}")
+        return self.new(f"getelementptr inbounds {stored}, ptr {array.leaves[0]}, i64 {self.scalar(index, INTEGER)}")
 
     # ---- arithmetic and calls ----------------------------------------------------------------------------------------
 
@@ -273,11 +273,11 @@ class Values:
     def word_len(self, array: Value) -> Value:
         return Value(INTEGER, array.leaves[1:2])
 
-    def word_load(self, array: Value, place: Value) -> Value:
-        return self.loaded(array.type.element, self.flat_address(array, place))
+    def word_load(self, array: Value, index: Value) -> Value:
+        return self.loaded(array.type.element, self.flat_address(array, index))
 
-    def word_store(self, array: Value, place: Value, value: Value) -> Value:
-        self.put(array.type.element, self.flat_address(array, place), value)
+    def word_store(self, array: Value, index: Value, value: Value) -> Value:
+        self.put(array.type.element, self.flat_address(array, index), value)
         return Value((), ())
 
 

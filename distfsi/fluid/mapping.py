@@ -1,7 +1,7 @@
 """A run that goes on from the end of another in radial coordinates: `[fluid.map]`.
 
 The other run's cells are shells, rings or layers of rings. Of each the part that lies in a cell of this run is known
-exactly (fluid/overlaps.py), so masses, volumes of phases and energy are conserved. A cell gets the momentum away from
+exactly (scene/overlaps.py), so masses, volumes of phases and energy are conserved. A cell gets the momentum away from
 the centre, or the axis, of all that it holds, in the direction of its own centroid: that conserves radial momentum, and
 what motion a cell loses where it mixes what has different velocities becomes heat.
 """
@@ -19,9 +19,9 @@ from distfsi.coordinates.cylindrical import Cylindrical
 from distfsi.coordinates.planar import Planar
 from distfsi.coordinates.spherical import Spherical
 from distfsi.errors import InputError
-from distfsi.fluid import overlaps
 from distfsi.fluid.finished import FinishedRun
 from distfsi.mesh.blocks import Blocks
+from distfsi.scene import overlaps
 from distfsi.scene.description import Map, Scene
 
 WHOLE = 1e-9  # part of a cell that counts as nothing: rounding leaves as much of a small one far from the centre
@@ -31,7 +31,7 @@ WHOLE = 1e-9  # part of a cell that counts as nothing: rounding leaves as much o
 class Shells:
     """How the shells or rings of one coordinate system lie in the cells of another.
 
-    volume  of a ball or disc from its centre to a corner of a cell (fluid/overlaps.py)
+    volume  of a ball or disc from its centre to a corner of a cell (scene/overlaps.py)
     across  axes of the cells in which its radius lies
     along   axis of the cells along which nothing varies, or layers lie; None: there is none
     """

@@ -247,7 +247,7 @@ def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) ->
 
 def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
     """Bodies in a fluid are tight, and faces look no farther than to the next cells."""
-    if given.drop_below is not None and given.scheme == "paper":
+    if given.drop_below is not None and given.scheme == "immersed_boundary":
         yield Fault(("coupling", "drop_below"), "needs scheme 'cut_cells'")
     if fluid.reconstruction == "weno5":
         yield Fault(("fluid", "reconstruction"), "'weno5' looks past the cells beside a solid; expected another")

@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene
+from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene, Shape
+from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.shapes import contains, distance
 from distfsi.scene.waves import Side, Wave, meet
 
@@ -46,11 +47,19 @@ class Layout:
         region = np.zeros(len(points), dtype=np.int64)
         for number, part in enumerate(scene.fluid.regions):
             if part.shape is not None:
-                region[contains(part.shape, points)] = number
+                region[self._inside(part.shape, points)] = number
         reach = 0.5 * math.hypot(*self.spacing)
         for body in scene.solid.bodies if scene.solid else ():
             region[distance(body.shape, points) < reach] = COVERED
         self.region = region.reshape(grids[0].shape)
+
+    def _inside(self, shape: Shape, points: np.ndarray) -> np.ndarray:
+        """Which of `points` (n, D) lie in a shape; of one that lies between them, that about which it fills most."""
+        inside = contains(shape, points)
+        if not inside.any():
+            filled = cell_fractions(shape, tuple(self.centers), tuple(self.spacing)).ravel()
+            inside[np.argmax(filled)] = filled.any()
+        return inside
 
     @cached_property
     def contacts(self) -> list[Contact]:
@@ -164,7 +173,7 @@ def sub_steps(scene: Scene, layout: Layout | None) -> float:
 def _step_rate(scene: Scene, layout: Layout | None) -> float:
     """1/dt [1/s]."""
     rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
-    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "paper" else 1
+    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "immersed_boundary" else 1
     return max(rate, _solid_rate(scene) / parts)
 
 
