@@ -1,4 +1,4 @@
-"""Cut cells: geometry, uniform flow kept, pistons, closed books, thin plates that do not leak."""
+"""Cut cells: geometry, uniform flow kept, pistons, closed budgets, thin plates that do not leak."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -294,7 +294,7 @@ def test_a_disc_that_spins_in_gas_at_rest_does_nothing_to_it(packing, noise):
     assert volumes(case).sum() == pytest.approx(volume, rel=1e-5)
 
 
-# ---- books ----------------------------------------------------------------------------------------------------------
+# ---- budgets --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("thickness", [0.05, 0.025, pytest.param(1.0, marks=pytest.mark.full)])
@@ -504,7 +504,7 @@ TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in (
 
 @pytest.mark.parametrize(("thickness", "ratio"), TORN)
 def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
-    """Its bonds break, gas passes, no state is negative, and all books close."""
+    """Its bonds break, gas passes, no state is negative, and the budget closes."""
     h, fails = 1.0 / 24, PrincipalStress(1.0, 1e-3, Scatter(8.0, 1.0 / 24, 1))
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
@@ -643,7 +643,7 @@ def test_a_lone_particle_is_dragged_along_as_a_sphere(dimensions):
 
 @pytest.mark.parametrize("phases", [AIR, pytest.param(AIR_AND_WATER, marks=pytest.mark.full)])
 def test_a_cloud_of_debris_that_flies_apart_turns_to_dust(phases):
-    """All books close, no state is negative, and what was its wall opens."""
+    """The budget closes, no state is negative, and what was its wall opens."""
     places = 0.5 + 0.03 * (np.stack(np.meshgrid(*[np.arange(5)] * 2), -1).reshape(-1, 2) - 2.25)
     cloud = [speck(tuple(x), 0.02, 30.0, tuple(12.0 * (x - 0.5))) for x in places]
     regions = [(gas(1.0, 1.0, (0.2, 0)), None)]
@@ -732,7 +732,7 @@ def struck_plate(drop_below):
 
 
 def test_the_fluid_is_dropped_when_it_pushes_no_more():
-    """The plate flies on as with the fluid, all books close, and a restart before or after it ends in the same bits."""
+    """The plate flies on as with the fluid, the budget closes, and a restart before or after ends in the same bits."""
     kept, dropped, later, latest = struck_plate(None), struck_plate(0.02), struck_plate(0.02), struck_plate(0.02)
     before, at = dropped.balance(), None
     while dropped.simulation.time < 2.0:

@@ -32,17 +32,21 @@ class Coupling(Protocol):
     reach      [m]: how far the solid's ghosts and images must go
     sub_steps  how many sub-steps of the solid a step has at most
     stray      [m]: how far particles may go between two migrations, if there are sub-steps
-    causes     of what the coupling creates or takes, keys of budget_by_cause()
-    kind       field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
-               coupling/kernels/cells.py
     """
 
     device: Device
     reach: float
     sub_steps: int
     stray: float
-    causes: tuple[str, ...]
-    kind: DualArray
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Of what the coupling creates or takes, keys of budget_by_cause()."""
+
+    @property
+    def kind(self) -> DualArray:
+        """Field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
+        coupling/kernels/cells.py."""
 
     def time_step(self) -> float:
         """Longest step [s] that this rank's particles allow, or sub-step when the wall moves on; inf: any."""

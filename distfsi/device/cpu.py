@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from copy import copy
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ __all__ = ["Bound", "NotInSubset", "Cpu", "build", "cache_directory"]
 
 
 def build(
-    drivers: Iterable[Callable],
+    drivers: Iterable[Callable[..., Any]],
     constants: Mapping[str, object],
     bindings: Mapping[str, Bound | type] | None = None,
     real: str = "float64",
@@ -55,7 +56,7 @@ class Cpu:
         same.seconds = 0.0
         return same
 
-    def run(self, kernel: Callable, count: int, *arguments) -> None:
+    def run(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
         """Call `kernel(begin, end, *arguments)` on ranges that together cover 0 … count."""
         started = clock.perf_counter()
         self._share(kernel, count, *arguments)
@@ -64,7 +65,7 @@ class Cpu:
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
         return wanted
 
-    def run_few(self, kernel: Callable, count: int, *arguments) -> None:
+    def run_few(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
         """Call `kernel(0, count, *arguments)` on this thread."""
         if count:
             kernel(0, count, *arguments)
@@ -94,7 +95,7 @@ class Cpu:
     def download_to(self, message: np.ndarray, array: np.ndarray) -> None:
         self.upload(message, array)
 
-    def asynchronous(self) -> nullcontext:
+    def asynchronous(self) -> nullcontext[None]:
         return nullcontext()
 
     def join_asynchronous(self) -> None:
@@ -109,7 +110,7 @@ class Cpu:
     def seconds_between(self, first: float, then: float) -> float:
         return then - first
 
-    def _share(self, function: Callable, count: int, *arguments) -> None:
+    def _share(self, function: Callable[..., Any], count: int, *arguments: Any) -> None:
         if self._pool is None or count < 2:
             if count:
                 function(0, count, *arguments)

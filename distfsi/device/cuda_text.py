@@ -11,14 +11,17 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from distfsi.device.cuda_writer import Writer, number, safe
 from distfsi.device.emit import Emission, callees_first, number_names
 from distfsi.device.exponential import EXPONENTIALS
+from distfsi.device.markers import ByHand
 from distfsi.device.source import Bound, Callee, parameters_of
 from distfsi.formulas.subset import Varying
+from distfsi.narrowing import of_kind
 
 C_TYPES = {"float64": "double", "float32": "float", "bool": "bool", "int64": "long long", "int32": "int"}
 C_TYPES |= {"int8": "signed char", "uint8": "unsigned char"}
@@ -38,9 +41,9 @@ def runtime_text(real: str) -> str:
 
 
 def kernel_text(
-    driver: Callable,
+    driver: Callable[..., Any],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound],
+    bindings: Mapping[str, Bound | type],
     real: str,
     arguments: Sequence[object],
 ) -> str:
@@ -64,19 +67,19 @@ def kernel_text(
 
 
 def text_by_hand(
-    driver: Callable,
+    driver: Callable[..., Any],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound],
+    bindings: Mapping[str, Bound | type],
     real: str,
     arguments: Sequence[object],
 ) -> str:
     """The CUDA C of a kernel whose loops are written by hand, with the formulas and numbers that it is made for."""
-    written, names = driver.__by_hand__, parameters_of(driver)
+    written, names = by_hand(driver), parameters_of(driver)
     emission, formulas = formulas_by_hand(driver, constants, bindings)
     scalars = number_names(len(emission.numbers))
-    integers = {name: value for name, value in constants.items() if type(value) in (int, bool)}
+    integers = {name: int(value) for name, value in constants.items() if isinstance(value, int)}
     integers |= written.block(constants, dict(zip(names, arguments, strict=False)))
-    lines = [f"constexpr int {name} = {int(value)};" for name, value in integers.items()]
+    lines = [f"constexpr int {name} = {value:d};" for name, value in integers.items()]
     lines += [f"#define HAS_{name}" for name in integers]
     lines += [
         f"constexpr real HALF = {number(0.5, real)};",
@@ -93,16 +96,21 @@ def text_by_hand(
     return in_namespace(real, ["\n".join(lines), "\n\n".join(parts), file.read_text()])
 
 
+def by_hand(driver: Callable[..., Any]) -> ByHand:
+    """How a driver's kernel is written by hand."""
+    return of_kind(ByHand, getattr(driver, "__by_hand__", None))
+
+
 def formulas_by_hand(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]
+    driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound | type]
 ) -> tuple[Emission, dict[str, Callee]]:
     """The formulas that a hand-written kernel calls, as far as a scene binds them, by the names in which it does."""
-    emission, names = Emission(constants, bindings), [n for n in driver.__by_hand__.formulas if n in bindings]
+    emission, names = Emission(constants, bindings), [n for n in by_hand(driver).formulas if n in bindings]
     return emission, {n: emission.add_bound(n) for n in names}
 
 
 def numbers_of(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound]
+    driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound | type]
 ) -> tuple[float | Varying, ...]:
     """What the scene measures, in the order in which the driver's kernel gets it. Raises NotInSubset."""
     if hasattr(driver, "__by_hand__"):

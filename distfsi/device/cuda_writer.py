@@ -6,10 +6,13 @@ import ast
 import math
 import re
 from collections.abc import Sequence
+from typing import TypeGuard
 
 import numpy as np
 
 from distfsi.device.source import NotInSubset, Source
+from distfsi.device.trees import called, name_of
+from distfsi.narrowing import of_kind
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<",
@@ -71,7 +74,7 @@ class Writer:
         loop = tree.body[-1]
         wanted = [argument.arg for argument in tree.args.args[:2]]
         bounds = ast.unparse(loop.iter) if isinstance(loop, ast.For) else ""
-        if bounds != f"range({wanted[0]}, {wanted[1]})":
+        if not isinstance(loop, ast.For) or bounds != f"range({wanted[0]}, {wanted[1]})":
             raise self.refuse("its last statement is not the loop over its items, range(begin, end)")
         if any(isinstance(node, ast.Return) for node in ast.walk(tree)):
             raise self.refuse("a return would end other items")
@@ -127,7 +130,7 @@ class Writer:
     def unpacked(self, target: ast.Tuple, value: ast.expr) -> list[str]:
         if isinstance(value, ast.Tuple) and all(self.is_workspace(item) for item in value.elts):
             pairs = zip(target.elts, value.elts, strict=True)
-            return [line for name, item in pairs for line in self.workspace(name.id, item)]
+            return [line for part, item in pairs for line in self.workspace(name_of(part), of_kind(ast.Call, item))]
         self.temporaries += 1
         whole = f"t{self.temporaries}_"
         lines = [f"const auto {whole} = {self.expression(value)};"]
@@ -139,20 +142,20 @@ class Writer:
         """Lines that give `target` a value; the first assignment to a name declares it."""
         if isinstance(target, ast.Subscript):
             return [f"{self.expression(target.value)}.at({self.indices(target.slice)}) = {value};"]
-        name = safe(target.id)
+        name = safe(name_of(target))
         if any(name in scope for scope in self.scopes):
             return [f"assign({name}, {value});"]
         self.scopes[-1].add(name)
         return [f"auto {name} = {value};"]
 
     @staticmethod
-    def is_workspace(node: ast.expr) -> bool:
-        return isinstance(node, ast.Call) and node.func.id == "workspace"
+    def is_workspace(node: ast.expr) -> TypeGuard[ast.Call]:
+        return isinstance(node, ast.Call) and called(node) == "workspace"
 
     def workspace(self, name: str, call: ast.Call) -> list[str]:
         if not isinstance(call.args[0], ast.Constant):
             raise self.refuse("the size of a workspace must be fixed by the scene")
-        size, name = call.args[0].value, safe(name)
+        size, name = of_kind(int, call.args[0].value), safe(name)
         self.scopes[-1].add(name)
         return [f"real {name}_values[{size}];", f"const Array<real, 1> {name}{{{name}_values, {{{size}}}}};"]
 
@@ -164,10 +167,10 @@ class Writer:
         return [f"while ({self.expression(node.test)})", *self.nested(node.body)]
 
     def for_lines(self, node: ast.For) -> list[str]:
-        name = safe(node.target.id)
+        name = safe(name_of(node.target))
         if any(name in scope for scope in self.scopes):
             raise self.refuse(f"{name} runs over a range, but has a value already")
-        if not (isinstance(node.iter, ast.Call) and node.iter.func.id == "range"):
+        if not (isinstance(node.iter, ast.Call) and called(node.iter) == "range"):
             raise self.refuse("loops run over a range")
         bounds = [self.expression(bound) for bound in node.iter.args]
         first, end = bounds[:2] if len(bounds) > 1 else ("integer(0)", bounds[0])
@@ -175,7 +178,7 @@ class Writer:
         if len(bounds) == 3:
             if not isinstance(node.iter.args[2], ast.Constant):
                 raise self.refuse("the step of a range must be fixed by the scene")
-            step, sign = bounds[2], "<" if node.iter.args[2].value > 0 else ">"
+            step, sign = bounds[2], "<" if of_kind(int, node.iter.args[2].value) > 0 else ">"
         if node is self.items:
             first, step = f"{first} + thread_number()", "thread_count()"
         head = f"for (integer {name} = {first}, {name}_end = {end}; {name} {sign} {name}_end; {name} += {step})"
@@ -196,9 +199,10 @@ class Writer:
             return "true" if node.value else "false"
         if isinstance(node.value, int):
             return f"integer({node.value})"
-        if math.isinf(node.value):
-            return "infinity()" if node.value > 0.0 else "-infinity()"
-        return number(node.value, self.real)
+        value = of_kind(float, node.value)
+        if math.isinf(value):
+            return "infinity()" if value > 0.0 else "-infinity()"
+        return number(value, self.real)
 
     def name(self, node: ast.Name) -> str:
         name = safe(node.id)
@@ -227,7 +231,7 @@ class Writer:
         return f"{self.operand(node.test)} ? {self.operand(node.body)} : {self.operand(node.orelse)}"
 
     def call(self, node: ast.Call) -> str:
-        return f"{WORDS.get(node.func.id, node.func.id)}({', '.join(map(self.expression, node.args))})"
+        return f"{WORDS.get(called(node), called(node))}({', '.join(map(self.expression, node.args))})"
 
     def attribute(self, node: ast.Attribute) -> str:
         return f"{self.expression(node.value)}.{node.attr}" + ("()" if node.attr == "size" else "")
@@ -235,13 +239,13 @@ class Writer:
     def subscript(self, node: ast.Subscript) -> str:
         value = self.expression(node.value)
         if isinstance(node.value, ast.Attribute):
-            return f"{value}[{node.slice.value}]"
+            return f"{value}[{of_kind(ast.Constant, node.slice).value!r}]"
         if isinstance(node.slice, ast.Constant):
-            return f"item<{node.slice.value}>({value})"
+            return f"item<{node.slice.value!r}>({value})"
         return f"{value}({self.indices(node.slice)})"
 
     def indices(self, node: ast.expr) -> str:
         indices = node.elts if isinstance(node, ast.Tuple) else [node]
-        if any(isinstance(index, ast.Constant) and index.value < 0 for index in indices):
+        if any(isinstance(index, ast.Constant) and of_kind(int, index.value) < 0 for index in indices):
             raise self.refuse("an index below zero")
         return ", ".join(str(i.value) if isinstance(i, ast.Constant) else self.expression(i) for i in indices)

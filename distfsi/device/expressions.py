@@ -5,15 +5,17 @@ from __future__ import annotations
 import ast
 import operator
 from collections.abc import Callable, Mapping
+from typing import Any, TypeGuard
 
 from distfsi.device.source import Callee, NotInSubset, Source, fields_of, flat_names, is_record
-from distfsi.device.trees import Number, constant_of, copied, named, truth_of
+from distfsi.device.trees import Number, constant_of, copied, name_of, named, truth_of
+from distfsi.narrowing import present
 
 NUMBERS = "numbers_"  # the tuple in which functions hand on what a scene measures
 MATH_WORDS = ("sqrt", "exp", "log", "pow", "abs", "min", "max")
 KERNEL_WORDS = ("floor", "load", "store", "workspace", "range", "int", "int32", "len", "real")
 
-_OPERATORS = {
+_OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.USub: operator.neg, ast.Not: operator.not_,
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
@@ -26,13 +28,22 @@ class Expressions(ast.NodeTransformer):
     """Folds the expressions of one function.
 
     `lookup(name)` gives the tree of a scene constant; `call(name)` the callee. Both raise KeyError for what they do not
-    know. `known`: names with a fixed value; `records`: parameters that are records, with their classes.
+    know.
+
+    known       names that have a fixed value by now
+    propagated  those that may get one: they are assigned to once, and always
+    locals      parameters and names that are assigned to
+    records     parameters that are records, with their classes
+    parameters  of the source, but for records of which the scene gives all fields
     """
 
     def __init__(self, source: Source, lookup: Callable[[str], ast.expr], call: Callable[[str], Callee]):
         self.source, self.lookup, self.call = source, lookup, call
         self.known: dict[str, ast.expr] = {}
         self.locals: set[str] = set()
+        self.propagated: set[str] = set()
+        self.records = {name: class_ for name, class_ in source.parameters.items() if class_ is not None}
+        self.parameters = {n: class_ for n, class_ in source.parameters.items() if not self.is_fixed(n, class_)}
         self.in_kernel = source.kind != "formula"
 
     def refuse(self, node: ast.AST, why: str) -> NotInSubset:
@@ -41,7 +52,7 @@ class Expressions(ast.NodeTransformer):
 
     # ---- expressions -------------------------------------------------------------------------------------------------
 
-    def visit_Name(self, node: ast.Name):
+    def visit_Name(self, node: ast.Name) -> ast.expr:
         if not isinstance(node.ctx, ast.Load):
             return node
         if node.id in self.known:
@@ -53,7 +64,7 @@ class Expressions(ast.NodeTransformer):
         except KeyError:
             raise self.refuse(node, f"{node.id} is neither a local name nor fixed by the scene") from None
 
-    def visit_BinOp(self, node: ast.BinOp):
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         node.left, node.right = self.visit(node.left), self.visit(node.right)
         return self.combined(node)
 
@@ -95,7 +106,7 @@ class Expressions(ast.NodeTransformer):
             return ast.copy_location(ast.Constant(1.0), node)
         return None
 
-    def visit_UnaryOp(self, node: ast.UnaryOp):
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         node.operand = self.visit(node.operand)
         if type(node.op) not in _OPERATORS:
             raise self.refuse(node, f"operator {type(node.op).__name__} is not in the subset")
@@ -105,7 +116,7 @@ class Expressions(ast.NodeTransformer):
             return Number(f"-{node.operand.id}", -node.operand.value)
         return node
 
-    def visit_Compare(self, node: ast.Compare):
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
         if len(node.ops) != 1:
             raise self.refuse(node, "one comparison at a time")
         if type(node.ops[0]) not in _OPERATORS:
@@ -116,9 +127,9 @@ class Expressions(ast.NodeTransformer):
             return ast.copy_location(ast.Constant(_OPERATORS[type(node.ops[0])](left, right)), node)
         return node
 
-    def visit_BoolOp(self, node: ast.BoolOp):
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         stop = isinstance(node.op, ast.Or)  # the value that decides
-        values = []
+        values: list[ast.expr] = []
         for value in (self.visit(v) for v in node.values):
             known, truth = truth_of(value)
             if known and bool(truth) == stop:
@@ -131,7 +142,7 @@ class Expressions(ast.NodeTransformer):
         node.values = values
         return values[0] if len(values) == 1 else node
 
-    def visit_IfExp(self, node: ast.IfExp):
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         test = self.visit(node.test)
         known, value = truth_of(test)
         if known:
@@ -139,7 +150,7 @@ class Expressions(ast.NodeTransformer):
         node.test, node.body, node.orelse = test, self.visit(node.body), self.visit(node.orelse)
         return node
 
-    def visit_Subscript(self, node: ast.Subscript):
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         record, node.slice = self.record_of(node.value), self.visit(node.slice)
         known, index = constant_of(node.slice)
         if record is not None:
@@ -154,7 +165,7 @@ class Expressions(ast.NodeTransformer):
             raise self.refuse(node, "a formula's index must be fixed by the scene")
         return node
 
-    def visit_Attribute(self, node: ast.Attribute):
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         record = self.record_of(node.value)
         if record is not None:
             return self.field_of(node, *record)
@@ -187,10 +198,9 @@ class Expressions(ast.NodeTransformer):
         """The flat name and the class of a record: a parameter, or a field of a record that is one itself."""
         if isinstance(node, ast.Name) and node.id in self.records:
             return node.id, self.records[node.id]
-        if isinstance(node, ast.Attribute):
-            outer = self.record_of(node.value)
-            inner = fields_of(outer[1]).get(node.attr) if outer else None
-            if inner is not None and is_record(inner):
+        if isinstance(node, ast.Attribute) and (outer := self.record_of(node.value)):
+            inner = fields_of(outer[1]).get(node.attr)
+            if is_record(inner):
                 return f"{outer[0]}_{node.attr}", inner
         return None
 
@@ -223,7 +233,8 @@ class Expressions(ast.NodeTransformer):
                     raise self.refuse(call, f"the parameter {list(parameters)[k]} is no {made[0].__name__}")
                 out += made[1]
             else:  # a tuple that holds the fields
-                out += [ast.Subscript(argument, ast.Constant(k), ast.Load()) for k in range(len(fields_of(class_)))]
+                count = len(fields_of(present(class_)))
+                out += [ast.Subscript(argument, ast.Constant(k), ast.Load()) for k in range(count)]
         return out
 
     def made_record(self, node: ast.expr) -> tuple[type, list[ast.expr]] | None:
@@ -239,14 +250,14 @@ class Expressions(ast.NodeTransformer):
             raise self.refuse(node, f"{class_.__name__} has the fields {', '.join(names)}")
         return class_, [fields[name] for name in names]
 
-    def visit_Tuple(self, node: ast.Tuple):
+    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
         if isinstance(node.ctx, ast.Load):
             node.elts = self.expanded(node.elts)
         return node
 
-    def visit_Call(self, node: ast.Call):
-        if isinstance(node.func, ast.Attribute) and self.record_of(node.func.value):
-            if not self.is_fixed(*self.record_of(node.func.value)):
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        if isinstance(node.func, ast.Attribute) and (record := self.record_of(node.func.value)):
+            if not self.is_fixed(*record):
                 node.args.insert(0, node.func.value)
             node.func = ast.Name(ast.unparse(node.func), ast.Load())  # a formula of a law
         if made := self.made_record(node):
@@ -281,7 +292,7 @@ class Expressions(ast.NodeTransformer):
         node.func = ast.Name(callee.name, ast.Load())
         return node
 
-    def generic_visit(self, node: ast.AST):
+    def generic_visit(self, node: ast.AST) -> ast.AST:
         if isinstance(node, (ast.Constant, ast.Name, ast.Pass, ast.Break, ast.Continue, ast.Load, ast.Store)):
             return node
         raise self.refuse(node, f"{type(node).__name__} is not in the subset")
@@ -289,7 +300,7 @@ class Expressions(ast.NodeTransformer):
     # ---- unrolling ---------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def is_static_range(node: ast.expr) -> bool:
+    def is_static_range(node: ast.expr) -> TypeGuard[ast.Call]:
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "static_range"
 
     def static_values(self, call: ast.Call) -> range:
@@ -305,7 +316,7 @@ class Expressions(ast.NodeTransformer):
         generator = node.generators[0]
         if not self.is_static_range(generator.iter):
             raise self.refuse(node, "expected `expression for name in static_range(N)`")
-        name, items = generator.target.id, []
+        name, items = name_of(generator.target), []
         before = self.known.get(name)
         for value in self.static_values(generator.iter):
             self.known[name] = ast.Constant(value)

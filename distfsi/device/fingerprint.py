@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import CodeType
+from typing import Any
 
 from distfsi.device.source import Bound, Source, fields_of, is_record
 from distfsi.formulas.subset import Varying
@@ -18,15 +19,15 @@ WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone
 
 
 def fingerprint(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound | type], real: str
+    driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound | type], real: str
 ) -> str:
     """A hash of the functions that a driver can reach, as Python has compiled them, and of what a scene gives to the
     names in them: constants, formulas and records, but of floats only whether they are 0."""
-    seen: set[tuple] = set()
+    seen: set[tuple[object, ...]] = set()
     digest = hashlib.sha256(texts_depend_on() + real.encode())
     chosen = {name: record for name, record in bindings.items() if isinstance(record, type)}
 
-    def add(function: Callable, scope: Mapping[str, object], owner: str, law: type | None) -> None:
+    def add(function: Callable[..., Any], scope: Mapping[str, object], owner: str, law: type | None) -> None:
         if (function, owner, law) in seen:
             return
         seen.add((function, owner, law))
@@ -48,7 +49,7 @@ def fingerprint(
                 continue
             value = function.__globals__.get(name)
             for callee, its_law in [(value, None), *((getattr(record, name, None), record) for record in records)]:
-                if hasattr(callee, "__code__"):
+                if callee is not None and hasattr(callee, "__code__"):
                     add(callee, scope, owner, its_law)
             if is_record(value):
                 digest.update(repr(fields_of(value)).encode())
@@ -76,7 +77,7 @@ def texts_depend_on() -> bytes:
 
 
 @cache
-def _compiled(function: Callable) -> tuple[bytes, list[str]]:
+def _compiled(function: Callable[..., Any]) -> tuple[bytes, list[str]]:
     """What Python has made of a function, and the names of other modules in it."""
     code, kind = function.__code__, getattr(function, "__kind__", "")
     digest = f"{function.__module__} {kind}".encode() + marshal.dumps(code, WITHOUT_REFERENCES)

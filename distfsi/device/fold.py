@@ -15,25 +15,23 @@ import ast
 from collections import Counter
 
 from distfsi.device.expressions import MATH_WORDS, Expressions
-from distfsi.device.trees import copied, is_fixed, stored_names, truth_of
+from distfsi.device.trees import called, copied, is_fixed, name_of, stored_names, truth_of
 
 
 class Fold(Expressions):
     """Folds one function."""
 
     def run(self) -> ast.FunctionDef:
+        """The folded function, whose parameters are those that the scene does not give."""
         tree = self.source.tree()
         tree.decorator_list, tree.returns = [], None
-        self.records = {name: class_ for name, class_ in self.source.parameters.items() if class_ is not None}
-        flat = {name: self.flat_parameters(name, class_) for name, class_ in self.source.parameters.items()}
-        self.parameters = {n: class_ for n, class_ in self.source.parameters.items() if not self.is_fixed(n, class_)}
-        names = [name for each in flat.values() for name in each]
-        tree.args.args = [ast.arg(name) for name in names]
+        flat = [self.flat_parameters(name, class_) for name, class_ in self.source.parameters.items()]
+        tree.args.args = [ast.arg(name) for names in flat for name in names]
         sometimes = (ast.For, ast.While, ast.AugAssign, *((ast.If,) if self.in_kernel else ()))
         stored = list(stored_names(tree, sometimes))
         times = Counter(name for name, _ in stored)
         self.locals = {a.arg for a in tree.args.args} | set(times)
-        self.propagate = {name for name, within in stored if times[name] == 1 and not within}
+        self.propagated = {name for name, within in stored if times[name] == 1 and not within}
         tree.body = self.statements(tree.body)
         if not self.in_kernel:
             self.refuse_integers(tree)
@@ -43,7 +41,7 @@ class Fold(Expressions):
         """Integers are for indices and arguments of other formulas; elsewhere they turn float32 into float64."""
         for node in ast.iter_child_nodes(tree):
             index = isinstance(tree, ast.Subscript) and node is tree.slice
-            argument = isinstance(tree, ast.Call) and tree.func.id not in MATH_WORDS
+            argument = isinstance(tree, ast.Call) and called(tree) not in MATH_WORDS
             if isinstance(node, ast.Constant) and type(node.value) is int and not (index or argument):
                 raise self.refuse(node, f"write {node.value}.0: an integer would turn float32 into float64")
             self.refuse_integers(node)
@@ -61,7 +59,7 @@ class Fold(Expressions):
                 break
         return out
 
-    def visit_Assign(self, node: ast.Assign):
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt | list[ast.stmt] | None:
         if len(node.targets) != 1:
             raise self.refuse(node, "one target per assignment")
         node.value = self.visit(node.value)
@@ -70,7 +68,7 @@ class Fold(Expressions):
             parts = zip(target.elts, node.value.elts, strict=True)
             return self.statements([ast.copy_location(ast.Assign([t], v), node) for t, v in parts])
         if isinstance(target, ast.Name):
-            if target.id in self.propagate and is_fixed(node.value):
+            if target.id in self.propagated and is_fixed(node.value):
                 self.known[target.id] = node.value
                 return None
         elif isinstance(target, ast.Subscript):
@@ -81,7 +79,7 @@ class Fold(Expressions):
             raise self.refuse(node, "assign to names only")
         return node
 
-    def visit_AugAssign(self, node: ast.AugAssign):
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
         if not self.in_kernel:
             raise self.refuse(node, "a formula names each value once (no +=)")
         node.value = self.visit(node.value)
@@ -89,7 +87,7 @@ class Fold(Expressions):
             node.target = self.visit(node.target)
         return node
 
-    def visit_If(self, node: ast.If):
+    def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt]:
         test = self.visit(node.test)
         known, value = truth_of(test)
         if known:
@@ -101,32 +99,32 @@ class Fold(Expressions):
             node.body = [ast.Pass()]
         return node
 
-    def visit_For(self, node: ast.For):
+    def visit_For(self, node: ast.For) -> ast.stmt | list[ast.stmt]:
         if node.orelse:
             raise self.refuse(node, "no else on a loop")
         if self.is_static_range(node.iter):
-            out = []
+            name, out = name_of(node.target), list[ast.stmt]()
             for value in self.static_values(node.iter):
-                self.known[node.target.id] = ast.Constant(value)
+                self.known[name] = ast.Constant(value)
                 out += self.statements([copied(statement) for statement in node.body])
-            self.known.pop(node.target.id, None)
+            self.known.pop(name, None)
             return out
         if not self.in_kernel:
             raise self.refuse(node, "a formula loops over static_range only")
         node.iter, node.body = self.visit(node.iter), self.statements(node.body)
         return node
 
-    def visit_While(self, node: ast.While):
+    def visit_While(self, node: ast.While) -> ast.stmt:
         if not self.in_kernel:
             raise self.refuse(node, "a formula loops over static_range only")
         node.test, node.body = self.visit(node.test), self.statements(node.body)
         return node
 
-    def visit_Return(self, node: ast.Return):
+    def visit_Return(self, node: ast.Return) -> ast.stmt:
         node.value = self.visit(node.value) if node.value is not None else None
         return node
 
-    def visit_Expr(self, node: ast.Expr):
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt:
         if not self.in_kernel or not isinstance(node.value, ast.Call):
             raise self.refuse(node, "a statement that has no effect")
         node.value = self.visit(node.value)

@@ -34,7 +34,7 @@ class Device(Protocol):
 
     def build(
         self,
-        drivers: Iterable[Callable],
+        drivers: Iterable[Callable[..., Any]],
         constants: Mapping[str, object],
         bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",

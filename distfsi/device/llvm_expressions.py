@@ -22,6 +22,8 @@ from distfsi.device.llvm_types import (
 )
 from distfsi.device.llvm_values import Values, exponential
 from distfsi.device.source import Source
+from distfsi.device.trees import called
+from distfsi.narrowing import of_kind
 
 ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 BITWISE = {ast.BitAnd: "and", ast.BitOr: "or", ast.LShift: "shl", ast.RShift: "ashr"}
@@ -73,7 +75,7 @@ class Expressions(Values):
             return Value(BOOL, ("true" if node.value else "false",))
         if isinstance(node.value, int):
             return Value(INTEGER, (str(node.value),))
-        return Value(self.real, (number(node.value, self.real),))
+        return Value(self.real, (number(of_kind(float, node.value), self.real),))
 
     def value_of_name(self, node: ast.Name) -> Value:
         variable = self.found(node.id)
@@ -91,7 +93,7 @@ class Expressions(Values):
         a, b, operator = self.value(node.left), self.value(node.right), type(node.op)
         if operator in BITWISE and a.type == b.type == BOOL:
             return Value(BOOL, (self.new(f"{BITWISE[operator]} i1 {a.leaves[0]}, {b.leaves[0]}"),))
-        kind = INTEGER if a.type == b.type == BOOL else self.common(a.type, b.type)
+        kind = INTEGER if a.type == b.type == BOOL else of_kind(str, self.common(a.type, b.type))
         if operator is ast.Div and kind == INTEGER:
             kind = "double"
         x, y = self.scalar(a, kind), self.scalar(b, kind)
@@ -119,7 +121,7 @@ class Expressions(Values):
         if isinstance(node.op, ast.Not):
             return Value(BOOL, (self.new(f"xor i1 {self.truth(node.operand)}, true"),))
         value = self.value(node.operand)
-        kind = INTEGER if value.type == BOOL else value.type
+        kind = INTEGER if value.type == BOOL else of_kind(str, value.type)
         x = self.scalar(value, kind)
         return Value(kind, (self.new(f"sub i64 0, {x}" if kind == INTEGER else f"fneg {kind} {x}"),))
 
@@ -150,7 +152,7 @@ class Expressions(Values):
         if isinstance(whole.type, Array):
             return self.get(whole, self.indices(node.slice))
         if isinstance(node.slice, ast.Constant):
-            return self.item(whole, node.slice.value)
+            return self.item(whole, of_kind(int, node.slice.value))
         *others, chosen = parts_of(whole)
         index = self.integer(node.slice)
         for k, part in reversed(list(enumerate(others))):
@@ -162,10 +164,10 @@ class Expressions(Values):
 
     def value_of_call(self, node: ast.Call) -> Value:
         values = [self.value(argument) for argument in node.args]
-        word = getattr(self, f"word_{node.func.id}", None)
+        word = getattr(self, f"word_{called(node)}", None)
         if word is not None:
             return word(*values)
-        function = self.functions.function(node.func.id, tuple(value.type for value in values))
+        function = self.functions.function(called(node), tuple(value.type for value in values))
         return self.called(function, values)
 
     def word_workspace(self, n: Value) -> Value:

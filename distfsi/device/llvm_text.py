@@ -12,6 +12,7 @@ import ast
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from distfsi.device.emit import Emission
 from distfsi.device.llvm_expressions import Expressions
@@ -22,12 +23,14 @@ from distfsi.device.llvm_types import (
     Slot,
     Type,
     Value,
+    array_of,
     leaf_types,
     packed_type,
 )
 from distfsi.device.llvm_values import DECLARED
 from distfsi.device.source import Bound, Source
-from distfsi.device.trees import stored_names
+from distfsi.device.trees import called, name_of, stored_names
+from distfsi.narrowing import of_kind, present
 
 LOOPS = (ast.For, ast.While)
 
@@ -38,7 +41,7 @@ class Module:
 
     folded: Mapping[str, tuple[Source, ast.FunctionDef]]
     real: str
-    written: dict[tuple, Function] = field(default_factory=dict)
+    written: dict[tuple[object, ...], Function] = field(default_factory=dict)
     loops: int = 0
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -62,9 +65,9 @@ class Module:
 
 
 def module_of(
-    driver: Callable,
+    driver: Callable[..., Any],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound],
+    bindings: Mapping[str, Bound | type],
     real: str,
     types: tuple[Type, ...],
 ) -> tuple[Module, Function]:
@@ -94,7 +97,8 @@ class Writer(Expressions):
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
         """The function as `name`, for arguments of such types."""
         self.scopes = [{}]
-        parameters, alias = [], "noalias " if self.source.kind == "row" else ""
+        parameters: list[str] = []
+        alias = "noalias " if self.source.kind == "row" else ""
         for argument, kind in zip(self.tree.args.args, types, strict=True):
             leaves = [f"%p{len(parameters) + k}" for k in range(len(leaf_types(kind)))]
             for leaf, leaf_kind in zip(leaves, leaf_types(kind), strict=True):
@@ -139,7 +143,7 @@ class Writer(Expressions):
                 return
             getattr(self, f"write_{type(statement).__name__.lower()}")(statement)
 
-    def nested(self, body: Sequence[ast.stmt], **names: Value) -> None:
+    def nested(self, body: Sequence[ast.stmt], **names: Value | Slot) -> None:
         self.scopes.append(names)
         self.statements(body)
         self.scopes.pop()
@@ -164,14 +168,14 @@ class Writer(Expressions):
         if kind != self.returns:
             if kind is None or self.returns is None or self.common(kind, self.returns) != self.returns:
                 raise self.refuse("its values have several types; the first one must be the widest")
-            value = self.converted(value, self.returns)
+            value = self.converted(present(value), self.returns)
         self.give_back(value)
 
     def give_back(self, value: Value | None) -> None:
         for memory in self.owned:
             self.line(f"call void @free(ptr {memory})")
         leaves, packed = () if value is None else value.leaves, packed_type(self.returns)
-        if len(leaves) > 1:
+        if value is not None and len(leaves) > 1:
             whole = "poison"
             for k, (kind, leaf) in enumerate(zip(leaf_types(value.type), leaves, strict=True)):
                 whole = self.new(f"insertvalue {packed} {whole}, {kind} {leaf}, {k}")
@@ -193,8 +197,9 @@ class Writer(Expressions):
             for k, part in enumerate(target.elts):
                 self.store(part, self.item(value, k))
         else:
-            array = self.value(target.value)
-            self.put(array.type.element, self.address(array, self.indices(target.slice)), value)
+            item = of_kind(ast.Subscript, target)
+            array = self.value(item.value)
+            self.put(array_of(array).element, self.address(array, self.indices(item.slice)), value)
 
     def write_if(self, node: ast.If) -> None:
         yes, no, after = self.name("yes"), self.name("no"), self.name("after")
@@ -224,7 +229,7 @@ class Writer(Expressions):
         self.start(after)
 
     def write_for(self, node: ast.For) -> None:
-        if not (isinstance(node.iter, ast.Call) and node.iter.func.id == "range"):
+        if not (isinstance(node.iter, ast.Call) and called(node.iter) == "range"):
             raise self.refuse("loops run over a range")
         bounds, step = [self.integer(bound) for bound in node.iter.args], "1"
         if len(bounds) == 3:
@@ -240,7 +245,7 @@ class Writer(Expressions):
         self.branch(self.new(f"icmp {'sgt' if step[0] == '-' else 'slt'} i64 {i}, {end}"), body, after)
         self.start(body)
         self.loops.append((next_, after))
-        self.nested(node.body, **{node.target.id: Value(INTEGER, (i,))})
+        self.nested(node.body, **{name_of(node.target): Value(INTEGER, (i,))})
         self.loops.pop()
         self.go(next_)
         self.start(next_)

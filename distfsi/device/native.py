@@ -63,7 +63,11 @@ class Native:
     compiles it for each list of types that it is called with."""
 
     def __init__(
-        self, driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
+        self,
+        driver: Callable[..., Any],
+        constants: Mapping[str, object],
+        bindings: Mapping[str, Bound | type],
+        real: str,
     ):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
         self._compiled = False

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, is_dataclass
 from dataclasses import fields as dataclass_fields
 from functools import cache
-from typing import get_type_hints
+from typing import Any, TypeGuard, get_type_hints
 
 from distfsi.device.trees import copied
 
@@ -26,7 +26,7 @@ class Bound:
     law    whose formula it is, if it is one of a law: the law may have inherited it
     """
 
-    function: Callable
+    function: Callable[..., Any]
     constants: Mapping[str, object] = field(default_factory=dict)
     owner: str = ""
     law: type | None = None
@@ -68,7 +68,7 @@ class Source:
     records  classes that the scene puts in the place of those of parameters, by their names; "self": the law
     """
 
-    function: Callable
+    function: Callable[..., Any]
     records: Mapping[str, type] = field(default_factory=dict)
 
     @property
@@ -84,7 +84,7 @@ class Source:
     def name(self) -> str:
         """The name of the function, behind that of its law if it is a law's."""
         law = self.parameters.get("self")
-        return f"{law.__name__}_{self.function.__name__}" if law else self.function.__name__
+        return f"{law.__name__}_{self.function.__name__}" if law is not None else self.function.__name__
 
     @property
     def parameters(self) -> dict[str, type | None]:
@@ -97,9 +97,8 @@ class Source:
                 class_ = self.records.get("self") or _class_of(self.function)
             elif isinstance(class_, str):
                 class_ = eval(class_, self.function.__globals__)  # annotations of the project's own sources
-            if is_record(class_):
-                class_ = self.records.get(class_.__name__, class_)
-            found[name] = class_ if is_record(class_) else None
+            record = class_ if is_record(class_) else None
+            found[name] = None if record is None else self.records.get(record.__name__, record)
         return found
 
     def tree(self) -> ast.FunctionDef:
@@ -110,17 +109,17 @@ class Source:
         return copied(tree)
 
 
-def _class_of(function: Callable) -> type:
+def _class_of(function: Callable[..., Any]) -> type:
     """The class whose body a function stands in, at the top of its module."""
     return function.__globals__[function.__qualname__.split(".")[0]]
 
 
-def is_record(class_: object) -> bool:
+def is_record(class_: object) -> TypeGuard[type]:
     """Whether a class is a record: a named tuple, or a law (a dataclass of numbers)."""
     return isinstance(class_, type) and (hasattr(class_, "_fields") or is_dataclass(class_))
 
 
-def fields_of(record: type) -> dict[str, object]:
+def fields_of(record: type) -> dict[str, Any]:
     """The names and types of a record's fields."""
     types = get_type_hints(record)
     return {f.name: types[f.name] for f in dataclass_fields(record)} if is_dataclass(record) else types
@@ -135,7 +134,7 @@ def flat_names(name: str, record: type) -> list[str]:
     return out
 
 
-def parameters_of(function: Callable, first: int = 2) -> list[str]:
+def parameters_of(function: Callable[..., Any], first: int = 2) -> list[str]:
     """The flat parameters of a function from the `first` on: by default those of a driver behind begin and end."""
     found = Source(function).parameters.items()
     return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][first:]
@@ -153,5 +152,5 @@ def flat_values(arguments: Iterable[object]) -> list[object]:
 
 
 @cache
-def _parsed(function: Callable) -> ast.stmt:
+def _parsed(function: Callable[..., Any]) -> ast.stmt:
     return ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from typing import Any, TypeVar
 
 from distfsi.formulas.subset import Varying
+from distfsi.narrowing import of_kind
+
+Node = TypeVar("Node", bound=ast.AST)
 
 
 def named(node: ast.expr) -> ast.expr:
@@ -19,7 +23,7 @@ def named(node: ast.expr) -> ast.expr:
     return new
 
 
-def copied(node: ast.AST) -> ast.AST:
+def copied(node: Node) -> Node:
     """A tree with nodes of its own, several times as fast as by copy.deepcopy."""
     new = type(node)()
     for name, value in vars(node).items():
@@ -56,14 +60,24 @@ class Changing(ast.Name):
         self.value = value
 
 
-def literal(value: object) -> ast.expr:
+def name_of(node: ast.expr) -> str:
+    """A tree that is a name, as a text."""
+    return of_kind(ast.Name, node).id
+
+
+def called(node: ast.Call) -> str:
+    """The name of the function that is called."""
+    return name_of(node.func)
+
+
+def literal(value: Any) -> ast.expr:
     """The tree of a constant: a number, a truth value or a tuple of them."""
     if isinstance(value, tuple):
         return ast.Tuple([literal(item) for item in value], ast.Load())
     return ast.Constant(value)
 
 
-def given(value: object, label: str) -> ast.expr:
+def given(value: Any, label: str) -> ast.expr:
     """The tree of a constant that a scene gives, in which floats other than 0.0 are Numbers of that label."""
     if isinstance(value, tuple):
         return ast.Tuple([given(item, f"{label}[{k}]") for k, item in enumerate(value)], ast.Load())
@@ -80,12 +94,12 @@ def is_fixed(node: ast.expr) -> bool:
     return isinstance(node, (ast.Constant, Number, Changing))
 
 
-def truth_of(node: ast.expr) -> tuple[bool, object]:
+def truth_of(node: ast.expr) -> tuple[bool, Any]:
     """(True, value) when it is known whether the tree is true; a Number is, as it is not 0.0."""
     return (True, True) if isinstance(node, Number) else constant_of(node)
 
 
-def constant_of(node: ast.expr) -> tuple[bool, object]:
+def constant_of(node: ast.expr) -> tuple[bool, Any]:
     """(True, value) when the tree is a constant or a tuple of constants."""
     if isinstance(node, ast.Constant):
         return True, node.value

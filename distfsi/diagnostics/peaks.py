@@ -10,6 +10,7 @@ from distfsi.coupling.protocol import Coupling
 from distfsi.device.interface import DualArray
 from distfsi.diagnostics.derived import padded
 from distfsi.diagnostics.kernels import peaks as kernels
+from distfsi.diagnostics.watched import Watched
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Snapshot
 from distfsi.scene import description
@@ -43,7 +44,7 @@ class Peaks:
         self._limits = kernels.Limits(peaks.ambient_pressure, peaks.arrival_overpressure)
         self._grid, self._rows = blocks.grid_on(fluid.device), blocks.local_count * prod(blocks.shape[:2])
 
-    def after_step(self, simulation) -> None:
+    def after_step(self, simulation: Watched) -> None:
         """Take in the step just made; before the first one the state at the start."""
         fluid = self.fluid
         before = fluid.previous if simulation.steps else fluid.device_state

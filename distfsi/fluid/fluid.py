@@ -10,7 +10,7 @@ from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
 from distfsi.fluid import fields
 from distfsi.fluid.initial import InitialState
-from distfsi.fluid.kernels.records import StageStep, States
+from distfsi.fluid.kernels.records import StageTimes, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.fluid.mapping import Mapping
@@ -63,7 +63,7 @@ class Fluid:
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
         self._stages, self._calm = device.array(self.rest.stages), device.array(self.rest.calm)
-        self._extent = device.array(blocks.extent)
+        self._grid = blocks.grid_on(device)
         self._fastest = DualArray(device, np.zeros(blocks.local_count))
         self._before = self._accounted()
         self._signal: float | None = None
@@ -167,17 +167,11 @@ class Fluid:
         for."""
         tiles = tiles[~self.rest.calm[tiles] | self.tiling.touches_side[tiles]]
         output = self._buffers[_output(stage.number)]
-        real = output.dtype.type
         states = States(self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device)
-        step = StageStep(real(stage.b), real(dt), stage.weight, *self.rates(dt))
+        times = StageTimes(output.dtype.type(stage.b), dt, stage.weight)
         given = self.tiling.arguments(self._calm, self._stages)
         chosen = self.device.array(tiles)
-        self.device.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
-
-    def rates(self, dt: float) -> list[Any]:
-        """dt/h [s/m] along each of three axes, in the fluid's precision."""
-        real = self._buffers[0].dtype.type
-        return [real(dt / h) for h in self.blocks.grid.spacing]
+        self.device.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, times, self.tiling.box)
 
     def wake(self, blocks: np.ndarray) -> None:
         """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
@@ -192,12 +186,9 @@ class Fluid:
             return self._signal
         if not self.blocks.local_count:
             return 0.0
-        real = self._buffers[0].dtype.type
-        inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiling.block[~self.rest.settled])
-        cells = self._buffers[0].device, self._first_active(), self._extent
-        chosen = self.device.array(changed)
-        self.device.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
+        given = self.device.array(changed), self._buffers[0].device, self._fastest.device, self._grid
+        self.device.run(self.kernels.fastest_signals, len(changed), *given)
         return float(np.max(self._fastest.host()))
 
     @property
@@ -213,7 +204,7 @@ class Fluid:
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
         before = self.device.download(self.previous[block : block + 1])[(0, *self._inside(block))]
         speeds = fields.speeds(self.model, before.astype(np.float64))
-        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
+        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.spacing[block], strict=False))
         cell = np.unravel_index(np.nanargmax(signal), signal.shape)
         position = self._position(block, cell)
         text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({position}) m"
@@ -223,11 +214,6 @@ class Fluid:
         """The center of the cell (z, y, x) of a local block, in words."""
         centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
         return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
-
-    def _first_active(self) -> int:
-        gx, gy, gz = self.blocks.grid.ghosts
-        _, size_y, size_x = self.blocks.shape
-        return (gz * size_y + gy) * size_x + gx
 
     # ---- looking at it -----------------------------------------------------------------------------------------------
 

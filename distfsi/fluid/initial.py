@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -82,11 +83,11 @@ class InitialState:
             )
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
-                cells = field[(block, slice(None), *active)]
+                where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
-                    self._lay_over(cells, state, part)
+                    self._lay_over(field[where], state, part)
                 if mapping and number == 0:
-                    mapping.apply(block, cells)
+                    mapping.apply(block, field[where])
         if mapping:
             mapping.sum_up()
 

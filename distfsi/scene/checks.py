@@ -53,9 +53,9 @@ def check(
 
     `present`: names of the sections of the input, the invalid ones among them.
     """
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_fluid(sections.fluid, fluid)
-    if domain is None:
+    if domain is None or sections.domain is None:
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
@@ -63,7 +63,7 @@ def check(
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_inflow(sections.fluid, domain)
     yield from check_output(sections.output, present, domain)
     yield from check_gauges(sections.gauges, present, domain, solid)
@@ -217,7 +217,7 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
         case shape:
             lower, upper = bounding_box(shape)
-            extents = np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower)
+            extents = list(np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower))
     return math.prod(max(float(extent), 0.0) / body.spacing for extent in extents)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from distfsi.scene.faults import Fault, Path
@@ -35,7 +35,7 @@ def replace_former_words(data: dict[str, Any]) -> list[Fault]:
     return notes
 
 
-def _tables(data: Any, pattern: Sequence[str | int], path: Path = ()) -> Iterator[tuple[dict[str, Any], Path]]:
+def _tables(data: Any, pattern: Path, path: Path = ()) -> Iterator[tuple[dict[str | int, Any], Path]]:
     """The tables at a path, in which "*" stands for any name, and their paths."""
     if not isinstance(data, dict):
         return

@@ -82,7 +82,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))
-    if faults or not isinstance(sections, Input):
+    if faults or domain is None or not isinstance(sections, Input):
         return None, faults
     scene = Scene(
         title=sections.title or stem,

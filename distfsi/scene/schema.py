@@ -39,7 +39,7 @@ Ends = Annotated[
     tuple[description.BoundaryKind, description.BoundaryKind],
     Field(description="kind of the low and of the high end"),
 ]
-OUTFLOW = ("outflow", "outflow")
+OUTFLOW: tuple[description.BoundaryKind, description.BoundaryKind] = ("outflow", "outflow")
 
 
 class DomainInput(Table):

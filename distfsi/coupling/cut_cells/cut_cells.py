@@ -83,22 +83,7 @@ class CutCells:
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
-        self._build(scene)
-        self.sub_steps = scene.coupling.sub_steps
-        self._narrowest = float(min(grid.spacing[: grid.dimensions]))
-        self.stray = FARTHEST_MOVE * self._narrowest
-        fluid.set_volumes(self.fluid_volume)
-        # a wall that rests: the fractions before and after a step are the same
-        position = self._particles.position
-        passage = self._wall_particles.find(position)
-        self._lone.find(passage.middle, passage.bins)
-        for _ in ("before", "after"):
-            self._wall_particles.cut(passage, position, device.zeros(position.shape))
-        self._fill_at_start()
-
-    def _build(self, scene: Scene) -> None:
-        """The kernels, and who uses them."""
-        blocks, device, model, grid = self.blocks, self.device, self.model, self.blocks.grid
+        # the kernels, and who uses them
         coarsest = max(body.spacing for body in present(scene.solid).bodies)
         self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
         constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
@@ -117,6 +102,18 @@ class CutCells:
         self._fluxes = BandFluxes(model, self.wall.grid, device, self._rows, of_fluid)
         self._forces = WallForces(self._particles, self.wall, self._merging, self._rows, of_particles, of_fluid)
         self._sides = Sides(self.fluid, model.conserved, self.wall.grid, device, of_fluid)
+        # what a step asks for, and what it finds
+        self.sub_steps = scene.coupling.sub_steps
+        self._narrowest = float(min(grid.spacing[: grid.dimensions]))
+        self.stray = FARTHEST_MOVE * self._narrowest
+        fluid.set_volumes(self.fluid_volume)
+        # a wall that rests: the fractions before and after a step are the same
+        position = self._particles.position
+        passage = self._wall_particles.find(position)
+        self._lone.find(passage.middle, passage.bins)
+        for _ in ("before", "after"):
+            self._wall_particles.cut(passage, position, device.zeros(position.shape))
+        self._fill_at_start()
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Conserved state (variables,) of the first region without its velocity."""

@@ -49,6 +49,7 @@ class Tiles(NamedTuple):
     through  (tiles, 6, conserved) what has left through the domain's sides, per area of a face
     limited  (tiles,) faces at the low sides of its cells whose flux was limited
     metrics  (blocks, METRICS, X) of each column of cells, if coordinates are RADIAL
+    spacing  (blocks, 3) size of the cells of each block [m]
     """
 
     table: Any
@@ -57,6 +58,7 @@ class Tiles(NamedTuple):
     through: Any
     limited: Any
     metrics: Any
+    spacing: Any
 
 
 class Box(NamedTuple):
@@ -67,10 +69,17 @@ class Box(NamedTuple):
     z: int
 
 
-class StageStep(NamedTuple):
-    """One stage of a time step: after = before + b (now + change - before).
+class StageTimes(NamedTuple):
+    """One stage of a time step of `dt` [s]: after = before + b (now + change - before); `weight`: its share in it."""
 
-    weight   the stage's share in the step
+    b: float
+    dt: float
+    weight: float
+
+
+class StageStep(NamedTuple):
+    """The stage of cells of one size.
+
     x, y, z  dt/h along the axes [s/m]
     """
 
