@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from distfsi.commands.line import main
 from distfsi.coordinates import Coordinates, coordinates_of
 from distfsi.diagnostics.budget import Budget
+from distfsi.diagnostics.sampling import FluidSampler
+from distfsi.errors import InputError
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.registry import laws_of, word_of
+from distfsi.output.frames import Film
+from distfsi.scene import load
 from distfsi.scene.description import Ball, FluidState, HalfSpace, Performance, Region
 from distfsi.study.exact_cases import half_way
 from fluids import AIR, WATER
@@ -239,3 +244,95 @@ def test_a_smooth_wave_that_converges_is_of_second_order(symmetry):
         errors.append(np.abs(found - exact)[off_axis].mean())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders.min() > 1.8, (errors, orders)
+
+
+# ---- scenes ----------------------------------------------------------------------------------------------------------
+
+SCENE = """
+[domain]
+symmetry = "spherical"
+lower = 0
+upper = 1
+cells = 20
+x = ["axis", "outflow"]
+[time]
+end = 0.1
+[fluid.phases]
+gas = { eos = "ideal_gas", gamma = 1.4 }
+[[fluid.regions]]
+phase = "gas"
+density = 1
+pressure = 1
+"""
+BODY = (
+    'solid={bodies={a={shape={kind="ball", center=0.5, radius=0.1}, spacing=0.02, density=1000, strength="none", '
+    'eos={kind="linear", bulk_modulus=1e9}}}}'
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ((), []),
+        (["domain.symmetry=axisymmetric"], ["domain.symmetry", "does not go with 1 dimension(s); expected"]),
+        (["domain.symmetry=planar"], ["domain.x", "an end is 'axis'"]),
+        (['domain.x=["wall", "wall"]'], ["domain.x", "the low end lies at r = 0, but is 'wall'; expected 'axis'"]),
+        (['domain.x=["axis", "axis"]'], ["domain.x", "an end is 'axis'"]),
+        (["domain.lower=0.1"], ["domain.x", "an end is 'axis'"]),
+        (["domain.lower=-0.1", 'domain.x=["wall", "wall"]'], ["domain.lower", "-0.1 m along r; expected at least 0"]),
+        (["domain.cells=1"], ["domain.cells", "expected at least 2 along r"]),
+        (["domain.gravity=-9.81"], ["domain.gravity", "acts along r, which is not 'spherical'"]),
+        (["fluid.reconstruction=weno5"], ["fluid.reconstruction", "'weno5' is for equal cells"]),
+        ([BODY], ["domain.symmetry", "'spherical' is for fluids alone, not yet for solids"]),
+        (["domain.symmetry=round"], ["domain.symmetry", "expected one of 'axisymmetric', 'cylindrical'"]),
+    ],
+)
+def test_what_does_not_go_with_coordinates_is_told(tmp_path, changes, expected):
+    """Each fault with its key."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    if not expected:
+        assert word_of(type(load(path, changes).domain.coordinates)) == "spherical"
+        return
+    with pytest.raises(InputError) as found:
+        load(path, changes)
+    assert len(found.value.faults) == 1, found.value.faults
+    assert all(text in found.value.faults[0] for text in expected), found.value.faults
+
+
+def test_a_run_is_drawn_and_goes_on(tmp_path, capsys):
+    """Names of the axes, both sides of the axis, the report of `check`, a gauge, and a restart from the middle."""
+    text = SCENE.replace("spherical", "axisymmetric").replace("lower = 0", "lower = [0, 0]")
+    text = text.replace("upper = 1", "upper = [1, 0.5]").replace("cells = 20", "cells = [20, 10]")
+    text += '[[fluid.regions]]\nphase = "gas"\ndensity = 5\npressure = 9\n'
+    text += 'shape = { kind = "ball", center = [0, 0.2], radius = 0.3 }\n'
+    text += '[gauges.near]\nkind = "point"\nposition = [0.01, 0.2]\n'
+    (tmp_path / "scene.toml").write_text(text)
+    words = [str(tmp_path / "scene.toml"), "--set", f"output.directory={tmp_path / 'out'}"]
+    main(["check", *words])
+    assert "symmetry   axisymmetric; totals of all around the axis" in capsys.readouterr().out
+    main(["run", *words])
+    main(["plot", str(tmp_path / "out"), "--mirror"])
+    film = Film(tmp_path / "out", mirror=True)
+    (frame,) = film.frames([len(film) - 1])
+    assert frame.names[:2] == "rz" and frame.extent == (-1.0, 1.0, 0.0, 0.5)
+    np.testing.assert_array_equal(frame.cells["pressure"], frame.cells["pressure"][:, ::-1])
+    np.testing.assert_array_equal(frame.cells["velocity"][..., 0], -frame.cells["velocity"][:, ::-1, 0])
+    last = next(Film(tmp_path / "out").frames([len(film) - 1])).cells["pressure"]
+    main(["run", *words, "--set", "time.wall_clock_limit=1e-9", "--set", "time.maximum_steps=1"])
+    assert list((tmp_path / "out").glob("restart-*.h5"))
+    main(["run", *words, "--restart", "auto"])
+    again = next(Film(tmp_path / "out").frames([len(Film(tmp_path / "out")) - 1])).cells["pressure"]
+    np.testing.assert_array_equal(again, last)
+
+
+def test_points_near_the_axis_have_their_values():
+    """A gauge is linear between centroids: exact for what is linear in r, but beside the ends."""
+    regions = (Region(FluidState(0, 1.0, 1.0, (0.0,)), None),)
+    simulation = start(walled("spherical", regions, (16,)))
+    low = np.arange(16.0)
+    simulation.fluid.cells(0)[0, 0, 0] = 3.0 + coordinates_of("spherical").centroid(low, low + 1.0)
+    simulation.fluid.changed()
+    points = np.array([[0.8], [1.7], [7.3], [15.2]])
+    values = FluidSampler(simulation.fluid, None, points).values()
+    np.testing.assert_allclose(values[:, 1], 3.0 + points[:, 0], rtol=1e-14)
