@@ -111,7 +111,7 @@ def run(
     journal = Journal(directory, scene, communicator, threads, performance.sums)
     with requests, closing(progress), threadpool_limits(1), journal, compilation.announced(progress.compiling):
         while True:
-            simulation = Simulation.of(scene, communicator, threads, costs, device)
+            simulation = Simulation.of(scene, communicator, threads, costs, device, resumed=origin is not None)
             simulation.requested, simulation.timers = requests.strongest, timers
             budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
             records = Records(simulation, budget, performance, files, origin)
@@ -119,10 +119,14 @@ def run(
             if origin:
                 origin.restore(kept, simulation.blocks, communicator)
             else:
+                if simulation.fluid and simulation.fluid.mapping:
+                    progress.say("\n".join(simulation.fluid.mapping.lines()))
                 simulation.watch()
                 records.write()
             costs = advance(simulation, records, kept, requests, progress)
             if costs is None:
+                if scene.domain.coordinates.radial:
+                    records.write_restart(kept)  # another run may go on from it in more dimensions
                 break
             snapshots = {name: part.snapshot() for name, part in kept.items()}
             origin = Handover(simulation.time, simulation.steps, records.restart, snapshots)

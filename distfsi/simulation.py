@@ -83,15 +83,17 @@ class Simulation:
         threads: int | None = None,
         costs: np.ndarray | None = None,
         device: Device | None = None,
+        resumed: bool = False,
     ) -> Simulation:
         """Build the parts the scene needs, and no others.
 
-        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
+        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads; `resumed`: a
+        snapshot will be restored.
         """
         blocks = deal_blocks(scene, communicator, costs)
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if model else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if model else None
         structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
         solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupling: Coupling | None = None
@@ -99,6 +101,8 @@ class Simulation:
             coupled = COUPLINGS[scene.coupling.scheme]
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        if fluid and fluid.mapping:
+            simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)
@@ -242,7 +246,7 @@ class Simulation:
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
     """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
-    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene))
+    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene), domain.coordinates)
     blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
     if scene.solid is None or costs is not None:
         return blocks

@@ -121,7 +121,8 @@ def _remove_oldest(directory: Path) -> None:
 
 
 class Restart:
-    """A restart file of some run: its path, after which step and at which time [s] it was written, and the scene."""
+    """A restart file of some run: its path, after which step and at which time [s] it was written, and the scene as
+    `describe` gives it."""
 
     def __init__(self, path: Path):
         """Raises InputError when `path` is no complete restart file of this format."""
@@ -129,12 +130,17 @@ class Restart:
         try:
             with h5py.File(path) as file:
                 found, self.step = int(file.attrs["format"]), int(file.attrs["step"])
-                self._scene = json.loads(file["scene"][()])
+                self.scene = json.loads(file["scene"][()])
                 self.time = float(file["simulation/values/time"][()])
         except (OSError, KeyError) as error:
             raise InputError([f"{path}: is no complete restart file: {error}"]) from error
         if found != FORMAT:
             raise InputError([f"{path}: has format {found}, this version of distfsi reads format {FORMAT}"])
+
+    def array(self, name: str) -> np.ndarray:
+        """A whole array, by its name in the file."""
+        with h5py.File(self.path) as file:
+            return file[name][()]
 
     def changes(self, scene: Any) -> list[str]:
         """What has changed since the restart file was written and bears on the results, although it may.
@@ -143,9 +149,9 @@ class Restart:
         """
         now = describe(scene)
         changed = {
-            key: f"{key}: {now.get(key, 'absent')}; was {self._scene.get(key, 'absent')} in {self.path}"
-            for key in [*now, *(self._scene.keys() - now.keys())]
-            if now.get(key) != self._scene.get(key) and not any(f"{key}.".startswith(f"{free}.") for free in FREE)
+            key: f"{key}: {now.get(key, 'absent')}; was {self.scene.get(key, 'absent')} in {self.path}"
+            for key in [*now, *(self.scene.keys() - now.keys())]
+            if now.get(key) != self.scene.get(key) and not any(f"{key}.".startswith(f"{free}.") for free in FREE)
         }
         faults = [text for key, text in changed.items() if key not in REPORTED]
         if faults:

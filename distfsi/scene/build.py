@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from distfsi.coordinates import coordinates_of
 from distfsi.laws.law import Source
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.none import NoStrength
@@ -18,6 +19,7 @@ from distfsi.scene.description import (
     Domain,
     Fluid,
     FluidState,
+    Map,
     Output,
     Peaks,
     Performance,
@@ -33,6 +35,7 @@ from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
+    MapInput,
     ObstacleInput,
     OutputInput,
     PerformanceInput,
@@ -53,7 +56,7 @@ ARRIVAL = 0.01  # of the ambient pressure
 def build_domain(given: DomainInput) -> Domain:
     """The box of cells."""
     boundaries = tuple(getattr(given, axis) for axis in AXES[: len(given.cells)])
-    return Domain(given.lower, given.upper, given.cells, boundaries)
+    return Domain(given.lower, given.upper, given.cells, boundaries, coordinates_of(given.symmetry))
 
 
 def build_time(given: TimeInput) -> Time:
@@ -87,6 +90,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.sharpening,
         _detonation(given.detonation, phases) if given.detonation else None,
         Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
+        _map(given.map, dimensions) if given.map else None,
     )
 
 
@@ -100,6 +104,10 @@ def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation
     found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
     burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
     return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+
+
+def _map(given: MapInput, dimensions: int) -> Map:
+    return Map(given.run, given.center or (0.0,) * dimensions, AXES.index(given.axis))
 
 
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:

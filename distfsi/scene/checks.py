@@ -14,6 +14,7 @@ from distfsi.laws.registry import word_of
 from distfsi.narrowing import present
 from distfsi.scene.build import AXES, SIDES
 from distfsi.scene.cloud import Cloud
+from distfsi.scene.coordinate_checks import check_coordinates
 from distfsi.scene.description import (
     Ball,
     Body,
@@ -61,6 +62,7 @@ def check(
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
+    faults += check_coordinates(sections, domain, fluid, solid)
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself

@@ -12,6 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
@@ -26,7 +28,7 @@ Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -185,6 +187,16 @@ class Afterburn:
 
 
 @dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -199,6 +211,7 @@ class Fluid:
     sharpening: bool = False
     detonation: Detonation | None = None
     afterburn: Afterburn | None = None
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -261,12 +274,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:

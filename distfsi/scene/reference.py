@@ -52,6 +52,7 @@ SECTIONS = {
     "`[[charges]]`": ("ChargeInput",),
     "`[fluid.afterburn]`": ("AfterburnSectionInput",),
     "`law` of the afterburn": _names(Afterburn),
+    "`[fluid.map]`": ("MapInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),

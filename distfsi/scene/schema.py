@@ -12,7 +12,14 @@ from pydantic import BeforeValidator, Field, model_validator
 from distfsi.scene import description
 from distfsi.scene.charges import ChargeInput
 from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
-from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
+from distfsi.scene.law_tables import (
+    FailureInput,
+    GaugeInput,
+    SolidEosInput,
+    SourceInput,
+    StrengthInput,
+    SymmetryWord,
+)
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
@@ -49,6 +56,12 @@ class DomainInput(Table):
     x: Ends = OUTFLOW
     y: Ends = OUTFLOW
     z: Ends = OUTFLOW
+    symmetry: SymmetryWord = Field(
+        "planar",
+        description='what turns about an axis or a point: "axisymmetric" (2D): x is the distance r from an axis, y the '
+        'place z along it; "cylindrical", "spherical" (1D): x is the distance r from an axis or a point. Totals are of '
+        'the whole turn, in "cylindrical" per metre along the axis. The end at r = 0 has the kind "axis"',
+    )
     gravity: Acceleration | None = Field(None, description="acceleration of everything; default none")
 
 
@@ -107,6 +120,15 @@ class InflowInput(Table):
     z_high: StateInput | None = None
 
 
+class MapInput(Table):
+    """The end of another run, in radial coordinates, as the start of this one: over the first region, under the others.
+    Time goes on from there."""
+
+    run: str = Field(description="output directory of a finished run, or a restart file")
+    center: Position | None = Field(None, description="where its r = 0 (and z = 0) lies; default the origin")
+    axis: Literal["x", "y", "z"] = Field("z", description="3D: along which axis its own lies")
+
+
 class FluidInput(Table):
     """The compressible flow of one or two phases, numbered in order of appearance."""
 
@@ -114,6 +136,7 @@ class FluidInput(Table):
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    map: MapInput | None = Field(None, description="`[fluid.map]`: goes on from another run")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: description.Reconstruction = Field(
         "minmod", description="slopes of MUSCL, or curves through five cells; volume fractions then by van_leer"
