@@ -21,7 +21,7 @@ from distfsi.coupling.kernels import spreading
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs
+from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs, self_contact
 from launch import ROOT
 from side_by_side import SideBySide
 
@@ -29,7 +29,8 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 # Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
 FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_unbonded", "open_voids")
 NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "carry_unbonded", "keep_rates")
-FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
+FORMS = {"updated_lagrangian": (contact, neighbours, pairs)}
+FORMS["total_lagrangian"] = (bonds, contact, cracks, self_contact)
 CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
 CUT_CELLS += (redistribution, spreading, volumes)
 SCHEMES = {"paper": (covering, spreading, states), "cut_cells": CUT_CELLS}

@@ -48,7 +48,7 @@ def build_domain(given: DomainInput) -> Domain:
 
 def build_time(given: TimeInput) -> Time:
     """End and step size."""
-    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme)
+    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme, given.smallest_step)
 
 
 def build_fluid(given: FluidInput, dimensions: int) -> Fluid:

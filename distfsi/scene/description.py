@@ -198,7 +198,7 @@ class Time:
     """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
-    `wall_clock_limit` [s] of computing.
+    `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
     """
 
     end: float
@@ -206,6 +206,7 @@ class Time:
     maximum_steps: int | None
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
+    smallest_step: float = 1e-3
 
 
 @dataclass(frozen=True)

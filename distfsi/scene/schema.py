@@ -56,6 +56,9 @@ class TimeInput(Table):
     wall_clock_limit: quantity("s", gt=0.0) | None = Field(
         None, description="computing time after which the run stops early with a restart file, exit code 75"
     )
+    smallest_step: quantity("1", gt=0.0, lt=1.0) = Field(
+        1e-3, description="the run ends, exit code 3, where the stable step is below this part of the first one"
+    )
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
