@@ -20,8 +20,10 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import Key
 from distfsi.mesh.rows import Rows
 from distfsi.mesh.search import CellSort
+from distfsi.scene.description import Solid
 from distfsi.solid.formulas.smoothing import smoothing_kernel, smoothing_slope
 from distfsi.solid.kernels import contact as kernels
+from distfsi.solid.kernels.contact import UNKNOWN, WIDTH
 from distfsi.solid.kernels.records import Neighbours, Particles, SurfaceTables
 from distfsi.solid.neighbours import Near
 from distfsi.solid.sides import Sides
@@ -45,6 +47,7 @@ class Contact:
     """Forces between particles of different sides that are near each other, which are looked for when particles have
     moved. The forces are the same to the bit whenever that was.
 
+    widening  how far particles see, in the reach of their smoothing
     touching  (n,) what a particle sees of other sides without being pressed, in what a surface sees at touch: a column
               of the solid. More than 1: it has been there since the start
     """
@@ -56,14 +59,14 @@ class Contact:
         cells: CellSort,
         communicator: Communicator,
         sides: Sides,
-        spacing: np.ndarray,
+        scene: Solid,
         dimensions: int,
     ):
-        """`spacing` (bodies,) [m] of the particles of each body."""
+        spacing = np.array([body.spacing for body in scene.bodies])
         self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
         self._cells, self._communicator, self._sides, self._dimensions = cells, communicator, sides, dimensions
         self._tables = SurfaceTables(*map(device.array, surface_tables(spacing, dimensions)))
-        self._skin = SKIN * spacing.min()
+        self._skin, self.widening = SKIN * spacing.min(), WIDTH / scene.smoothing
         self._width = 8 * 3 ** (dimensions - 1)
         self._key: Key | None = None  # for whose particles the others were looked for
         self._last: Particles | None = None
@@ -74,7 +77,7 @@ class Contact:
 
     def bind(self, columns: Columns) -> None:
         """Add the column."""
-        columns["touching"] = np.full(len(columns["id"]), kernels.UNKNOWN)
+        columns["touching"] = np.full(len(columns["id"]), UNKNOWN)
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any) -> None:
         """Collective. Add the `acceleration` (own, D) [m/s2] of the contact forces."""
@@ -108,7 +111,7 @@ class Contact:
                 return
         self._key, self._last, side = key, particles, self._sides.of(key).read
         # Search cells of which those around a particle hold all that it may see; and the sides in each.
-        cell, bins = self._cells.sort(particles.position, key.device, near.support + self._skin)
+        cell, bins = self._cells.sort(particles.position, key.device, self.widening * near.support + self._skin)
         across = self._cells.strides[1 : self._dimensions]  # rows of three cells lie along x
         rows = [np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))]
         rows = device.array(np.sort(np.array(rows, dtype=np.int64)))
@@ -138,7 +141,7 @@ def surface_tables(spacing: np.ndarray, dimensions: int) -> SurfaceTables:
     kernel, slope = (plain(f, {"DIMENSIONS": dimensions}) for f in (smoothing_kernel, smoothing_slope))
 
     def sums(own: float, other: float) -> tuple[float, float, float]:
-        h = max(own, other)
+        h = WIDTH * max(own, other)
         x = 0.5 * own + other * (np.arange(math.ceil(2.0 * h / other)) + 0.5)
         x = x[x < 2.0 * h]
         r = np.linspace(0.0, 2.0 * h, POINTS)  # along the layer

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
-
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.search import CellSort
@@ -48,5 +46,4 @@ def obstacles_of(
     if not sides.meet:
         return walls
     cells = CellSort(kernels, device, domain.lower, domain.upper)
-    spacing = np.array([body.spacing for body in present(scene.solid).bodies])
-    return [Contact(kernels, device, cells, communicator, sides, spacing, domain.dimensions), *walls]
+    return [Contact(kernels, device, cells, communicator, sides, present(scene.solid), domain.dimensions), *walls]

@@ -153,7 +153,7 @@ class Solid:
             self.start, self.sub_steps = now, 0
             self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
             self._run(self.kernels.average_velocity, 1, *c.read("velocity"), self.before)
-        reach = max(reach, support)
+        reach = max(reach, support, *(obstacle.widening * support for obstacle in self._obstacles))
         plan = self.exchange.ghosts(now, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
         given = [(now, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
         position, state, *payload = plan.exchange(given)

@@ -19,9 +19,12 @@ UNKNOWN = -1e300  # nearer than can be: wherever a particle is first, it may sta
 class Walls:
     """Contact of particles with the walls, as with their mirror images.
 
+    widening       0: they look at no other particles
     wall_touching  (n,) distance from a wall, in half spacings, at which it begins to press: a column of the solid. Less
                    than 1: the particle has been so near since the start
     """
+
+    widening = 0.0
 
     def __init__(self, kernels: SimpleNamespace, device: Device, domain: Domain):
         walled = np.array(domain.boundaries) == "wall"

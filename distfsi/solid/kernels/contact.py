@@ -21,6 +21,7 @@ from distfsi.solid.kernels.records import (
 )
 
 EMPTY, MIXED = -1, -2  # in the place of the side of a search cell
+WIDTH = 1.3  # smoothing length in spacings of the coarser side; with 1 lattices that face each other slip aside
 UNKNOWN = 1e300  # more than can be seen: whatever a particle sees first is touch
 
 
@@ -29,12 +30,12 @@ UNKNOWN = 1e300  # more than can be seen: whatever a particle sees first is touc
 
 @driver
 def mark_moved(begin, end, farthest, particles: Particles, last: Particles, mark):
-    """mark[i] = 1 where a particle has moved, or grown by half of that, by more than `farthest` [m] since the `last`
+    """mark[i] = 1 where a particle has moved, or its reach has grown, by more than `farthest` [m] since the `last`
     search, else 0."""
     for i in range(begin, end):
         x = tuple(particles.position[i, d] - last.position[i, d] for d in static_range(DIMENSIONS))
         grown = (particles.state[i, SMOOTHING] - last.state[i, SMOOTHING]) / SMOOTHING_RATIO
-        mark[i] = 0 if sqrt(dot(x, x)) + 2.0 * grown <= farthest else 1
+        mark[i] = 0 if sqrt(dot(x, x)) + 2.0 * WIDTH * grown <= farthest else 1
 
 
 @driver
@@ -62,8 +63,8 @@ def mark_meeting(begin, end, cell, rows, side_of_cell, side, mark):
 
 @helper
 def contact_length(particles: Particles, i, j):
-    """Smoothing length of a pair in contact: the spacing of the coarser one."""
-    return max(particles.state[i, SMOOTHING], particles.state[j, SMOOTHING]) / SMOOTHING_RATIO
+    """Smoothing length of a pair in contact."""
+    return WIDTH * max(particles.state[i, SMOOTHING], particles.state[j, SMOOTHING]) / SMOOTHING_RATIO
 
 
 @driver
