@@ -209,7 +209,7 @@ class TotalLagrangian:
         self._run(near.own, "accelerate_bonds", bonds, bond_state, volume, mass, acceleration)
         self._self_contact.find(c, near, reference, payload)
         self._self_contact.accelerate(mass, acceleration)
-        given = (self._material(c), *c.read("deformation"), acceleration, limits)
+        given = (self._material(c), *c.read("deformation"), acceleration, *c.write("detaching"), limits)
         self._run(near.own, "limit_bonds", bonds.count, self._network.bodies, *given)
         self._bonds, self._bond_state = bonds, bond_state
 
