@@ -35,7 +35,8 @@ def _depth(first: Shape, second: Shape, points: np.ndarray) -> np.ndarray:
 
 def _starts(points: np.ndarray, depth: np.ndarray) -> list[int]:
     """The deepest of the points, then others that are not near those before."""
-    apart, chosen = APART * np.linalg.norm(np.ptp(points, axis=0)), []
+    apart = APART * np.linalg.norm(np.ptp(points, axis=0))
+    chosen: list[int] = []
     left = np.argsort(-depth, kind="stable")
     while len(left) and len(chosen) < STARTS:
         chosen.append(int(left[0]))

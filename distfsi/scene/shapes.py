@@ -1,4 +1,4 @@
-"""Geometry of the shapes: which points lie inside, how large they are, how much of each cell they fill."""
+"""Geometry of the shapes: which points lie inside, how large they are."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import math
 import numpy as np
 
 from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Shape, Tube
-
-SUBPOINTS = 8  # per axis, in cells that a curved or oblique surface may cut
 
 
 def dimensions(shape: Shape) -> int:
@@ -74,12 +72,12 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
             reach = radius * np.sqrt(np.maximum(1.0 - axis**2, 0.0))  # of its round faces
             return tuple(np.minimum(start, end) - reach), tuple(np.maximum(start, end) + reach)
         case HalfSpace(point, normal):
-            lower, upper = [-math.inf] * len(point), [math.inf] * len(point)
+            low, high = [-math.inf] * len(point), [math.inf] * len(point)
             axes = [d for d, n in enumerate(normal) if n != 0.0]
             if len(axes) == 1:
                 (d,) = axes
-                (upper if normal[d] > 0.0 else lower)[d] = point[d]
-            return tuple(lower), tuple(upper)
+                (high if normal[d] > 0.0 else low)[d] = point[d]
+            return tuple(low), tuple(high)
 
 
 def volume(shape: Box | Ball | Tube | Cylinder) -> float:
@@ -96,53 +94,55 @@ def volume(shape: Box | Ball | Tube | Cylinder) -> float:
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
 
 
-def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple[float, ...]) -> np.ndarray:
-    """Fraction of each cell of a grid that lies inside `shape`, shape ([nz,] [ny,] nx).
-
-    `centers` holds the cell centers along each axis, `spacing` the cell sizes [m]. Exact for boxes; otherwise cells
-    that the surface may cut are sampled at SUBPOINTS points per axis. A cell's value depends on its own center only,
-    so it is the same however the domain is cut into blocks.
-    """
-    shape_of_grid = tuple(len(x) for x in reversed(centers))
-    if _is_its_bounding_box(shape):
-        lower, upper = bounding_box(shape)
-        return _outer_product([_overlap(*args) for args in zip(lower, upper, centers, spacing, strict=True)])
-    grids = np.meshgrid(*reversed(centers), indexing="ij")
-    points = np.stack([g.ravel() for g in reversed(grids)], axis=1)
-    signed = distance(shape, points)
-    fractions = (signed < 0.0).astype(np.float64)
-    cut = np.flatnonzero(np.abs(signed) < 0.5001 * math.hypot(*spacing))
-    hits = sum(contains(shape, points[cut] + offset) for offset in _offsets(spacing))
-    fractions[cut] = hits / SUBPOINTS ** len(centers)
-    return fractions.reshape(shape_of_grid)
-
-
-def _is_its_bounding_box(shape: Shape) -> bool:
+def smallest_extent(shape: Shape) -> float | None:
+    """Smallest extent of a shape [m]; None for a half space."""
     match shape:
-        case HalfSpace(_, normal):
-            return sum(n != 0.0 for n in normal) == 1
-        case Ball(center, _):
-            return len(center) == 1
-    return isinstance(shape, Box)
+        case Box(lower, upper):
+            return min(b - a for a, b in zip(lower, upper, strict=True))
+        case Ball(_, radius):
+            return 2.0 * radius
+        case Tube(_, inner, outer):
+            return outer - inner
+        case Cylinder(start, end, outer, inner):
+            return min(math.dist(start, end), outer - inner if inner > 0.0 else 2.0 * outer)
+    return None
 
 
-def _overlap(lower: float, upper: float, centers: np.ndarray, spacing: float) -> np.ndarray:
-    """Fraction of each interval of length `spacing` about `centers` that lies in [lower, upper]."""
-    low = np.maximum((lower - centers) / spacing, -0.5)
-    high = np.minimum((upper - centers) / spacing, 0.5)
-    fraction = np.maximum(high - low, 0.0)
-    return np.where(fraction > 1.0 - 1e-9, 1.0, np.where(fraction < 1e-9, 0.0, fraction))
+def volume_within(shape: Shape, lower: tuple[float, ...], upper: tuple[float, ...]) -> float | None:
+    """Exact length, area or volume [m, m2, m3] of what lies in the box from `lower` to `upper` [m].
+
+    None where there is no short formula: ends of the box cut the shape, but neither through its center nor, if it is a
+    cylinder, through or across its axis.
+    """
+    if isinstance(shape, HalfSpace):
+        return None
+    low, high = bounding_box(shape)
+    if isinstance(shape, Box):
+        return math.prod(max(min(b, e) - max(a, s), 0.0) for a, b, s, e in zip(low, high, lower, upper, strict=True))
+    part = 1.0
+    for axis, (a, b, start, end) in enumerate(zip(low, high, lower, upper, strict=True)):
+        slack = 1e-9 * (b - a)
+        if a >= start - slack and b <= end + slack:
+            continue
+        if b <= start or a >= end:
+            return 0.0
+        if _lies_along(shape, axis):
+            part *= (min(b, end) - max(a, start)) / (b - a)
+            continue
+        halves = [abs(0.5 * (a + b) - plane) <= slack for plane in (start, end)]
+        if not any(halves) or (a < start - slack and b > end + slack) or not _is_even(shape, axis):
+            return None
+        part *= 0.5
+    return part * volume(shape)
 
 
-def _outer_product(factors: list[np.ndarray]) -> np.ndarray:
-    result = factors[-1]
-    for factor in reversed(factors[:-1]):
-        result = result[..., None] * factor
-    return result
+def _lies_along(shape: Shape, axis: int) -> bool:
+    """Whether it is a cylinder about a line along `axis`."""
+    return isinstance(shape, Cylinder) and all(
+        a == b for d, (a, b) in enumerate(zip(shape.start, shape.end, strict=True)) if d != axis
+    )
 
 
-def _offsets(spacing: tuple[float, ...]) -> np.ndarray:
-    """Sub-points of a cell relative to its center, (SUBPOINTS**D, D)."""
-    steps = (np.arange(SUBPOINTS) + 0.5) / SUBPOINTS - 0.5
-    grids = np.meshgrid(*(steps * h for h in spacing), indexing="ij")
-    return np.stack([g.ravel() for g in grids], axis=1)
+def _is_even(shape: Shape, axis: int) -> bool:
+    """Whether its two halves along `axis` are alike."""
+    return not isinstance(shape, Cylinder) or shape.start[axis] == shape.end[axis]

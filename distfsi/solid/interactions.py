@@ -42,7 +42,7 @@ def obstacles_of(
     """What bodies run into: other sides, and walls of the domain."""
     domain, device = scene.domain, exchange.device
     walled = any("wall" in ends for ends in domain.boundaries)
-    walls = [Walls(kernels, device, domain)] if walled else []
+    walls: list[Contact | Walls] = [Walls(kernels, device, domain)] if walled else []
     if not sides.meet:
         return walls
     cells = CellSort(kernels, device, domain.lower, domain.upper)
