@@ -1,6 +1,7 @@
 """Bodies that meet: each other, their mirror images, the walls of the domain; how they start, and what ends a run."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from distfsi.errors import InputError, StepTooShort
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.laws.sources.gravity import Gravity
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Tube
 from distfsi.scene.loader import load
@@ -168,17 +170,20 @@ def test_elastic_discs_bounce(form, angle):
     assert energy(part) == pytest.approx(whole, rel=1e-12)
 
 
-def test_momentum_angular_momentum_and_energy_are_kept():
-    """In an oblique hit of discs of different materials and spacings."""
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_momentum_angular_momentum_and_energy_are_kept(friction):
+    """In an oblique hit of discs of different materials and spacings; friction makes them spin."""
     left = body(Ball((-0.22, 0.1), 0.2), 0.04, 1000.0, (0.3, 0.0), SOFT_EOS, SOFT)
     right = body(Ball((0.22, -0.1), 0.2), 0.025, 3000.0, (-0.1, 0.05), SOFT_EOS, SOFT)
-    part = solid([left, right], (-1.0, -1.0), (1.0, 1.0), form="total_lagrangian")
+    part = solid([left, right], (-1.0, -1.0), (1.0, 1.0), form="total_lagrangian", friction=friction)
     whole, (mass, momentum, spin, _) = energy(part), momenta(part)
     run_until(part, 0.6)
     kept = momenta(part)
     assert energy(part) == pytest.approx(whole, rel=1e-12)
     assert np.abs(kept[1] - momentum).max() < 1e-12 * mass * 0.3
     assert abs(kept[2] - spin) < 1e-12 * mass * 0.3 * 0.4
+    own = momenta(part, part.columns["body"] == 0)
+    assert (abs(own[2]) > 0.05 * own[0] * 0.3 * 0.2) == (friction > 0.0)
 
 
 @pytest.mark.parametrize(("form", "ratio"), [(FORMS[0], 1), (FORMS[0], 4), (FORMS[1], 2)])
@@ -221,6 +226,39 @@ solid.form = "{form}"
     run_to_end(simulation)
     first, second = (simulation.solid.body_totals(b)["center"] for b in (0, 1))
     assert np.linalg.norm(second - first) == pytest.approx(distance, rel=0.02)
+
+
+# ---- friction --------------------------------------------------------------------------------------------------------
+
+
+def block_on_a_floor(friction, gravity, speed):
+    """A soft block, 4 particles high, on a fixed floor, under `gravity` (2,) [m/s2]; c = 41 m/s."""
+    eos, strength = LinearEos(1e6), Elastic(5e5)
+    floor = Box((-0.5, -0.05), (0.5, 0.0))
+    low = replace(body(floor, 0.025, 1000.0, (0.0, 0.0), eos, strength, floor), name="floor")
+    block = body(Box((-0.1, 0.0), (0.1, 0.1)), 0.025, 1000.0, (speed, 0.0), eos, strength)
+    sources = (Gravity(gravity),)
+    form = "total_lagrangian"
+    return solid([low, block], (-1.0, -1.0), (1.0, 1.0), form=form, sources=sources, friction=friction)
+
+
+@pytest.mark.parametrize(
+    ("friction", "slope", "speed"),
+    [(0.0, 0.0, 0.5), (0.3, 0.0, 0.5), (0.3, 0.0, 0.1), (0.3, 0.2, 0.0), (0.3, 0.5, 0.0)],
+    ids=["free", "slides", "stops", "sticks", "slips"],
+)
+def test_a_block_slides_and_sticks_as_coulomb_says(friction, slope, speed):
+    """On a floor or a slope, after 0.08 s under 10 m/s2 across. What the floor has pressed follows from how the block
+    rises or falls on it."""
+    part, time = block_on_a_floor(friction, (10.0 * slope, -10.0), speed), 0.08
+    chosen = part.columns["body"] == 1
+    run_until(part, time)
+    mass, momentum, _, _ = momenta(part, chosen)
+    velocity = momentum / mass
+    free, rubbed = speed + 10.0 * slope * time, friction * (10.0 * time + velocity[1])
+    sticks = friction > slope and free < rubbed
+    assert velocity[0] == pytest.approx(0.0 if sticks else free - rubbed, abs=0.01)
+    assert abs(velocity[1]) < 0.1
 
 
 # ---- walls -----------------------------------------------------------------------------------------------------------

@@ -110,7 +110,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     )
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    return Solid(bodies, given.smoothing, *viscosity, *form, given.zero_energy, given.artificial_stress)
+    return Solid(bodies, given.smoothing, *viscosity, *form, given.zero_energy, given.artificial_stress, given.friction)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

@@ -156,6 +156,7 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
+    `friction`: Coulomb's coefficient between bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -166,6 +167,7 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""

@@ -188,6 +188,7 @@ class SolidInput(Table):
         description="of the updated Lagrangian form: share of the tension with which close particles push each other "
         "away, against clumping; 0.3 is usual, 0 is none",
     )
+    friction: quantity("1", ge=0.0, le=2.0) = Field(0.0, description="Coulomb's coefficient between bodies that meet")
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

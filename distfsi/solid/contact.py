@@ -36,6 +36,7 @@ DRIVERS = (
     kernels.find_meeting,
     kernels.press_surfaces,
     kernels.begin_touch,
+    kernels.drag_surfaces,
     kernels.push_surfaces,
     kernels.heat_surfaces,
 )
@@ -72,7 +73,7 @@ class Contact:
         self._last: Particles | None = None
         self._chosen: Any = device.empty(0, np.int64)
         self._neighbours: Neighbours | None = None
-        self._began = False
+        self._began, self._rubs = False, scene.friction > 0.0
         self._pushes: tuple[Any, ...] | None = None  # what the forces of the last accelerate() follow from
 
     def bind(self, columns: Columns) -> None:
@@ -91,9 +92,14 @@ class Contact:
             self._began = True
         if not self._communicator.maximum(np.array([float(number)]))[0]:
             return
-        (pressure,) = near.plan.exchange([(own, ((),))])
-        self._device.run(self._kernels.push_surfaces, number, *pairs, pressure, acceleration)
-        self._pushes = (*pairs, pressure)
+        bearing: list[tuple[Any, Any]] = [(own, ((),))]
+        if self._rubs:
+            traction = self._device.zeros((near.own, self._dimensions))
+            self._device.run(self._kernels.drag_surfaces, number, *pairs, own, traction)
+            bearing.append((traction, near.vector))
+        pressure, *tractions = near.plan.exchange(bearing)
+        self._pushes = (*pairs, pressure, *(tractions or [self._device.empty((0, self._dimensions))]))
+        self._device.run(self._kernels.push_surfaces, number, *self._pushes, acceleration)
 
     def heat(self, columns: Columns, near: Near, dt: float, velocity: Any) -> None:
         """Advance the energy by the work of the forces in `dt` [s], with the new `velocity` (count, D) [m/s]."""

@@ -121,6 +121,7 @@ class Solid:
             "VISCOSITY_BETA": solid.viscosity_beta,
             "SMOOTHING_RATIO": solid.smoothing,
             "ARTIFICIAL_STRESS": solid.artificial_stress,
+            "FRICTION": solid.friction,
             "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
 

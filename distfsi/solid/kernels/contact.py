@@ -4,11 +4,12 @@ from math import sqrt
 
 from distfsi.device.markers import driver, helper
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, SMOOTHING_RATIO
+from distfsi.formulas.symbols import DIMENSIONS, FRICTION, SMOOTHING_RATIO
 from distfsi.formulas.tensors import dot
+from distfsi.solid.formulas.bonds import signal_time
 from distfsi.solid.formulas.contact import contact_pressure
 from distfsi.solid.formulas.smoothing import smoothing_kernel, smoothing_slope
-from distfsi.solid.kernels.matrices import difference, zero_vector
+from distfsi.solid.kernels.matrices import difference, store_vector, zero_vector
 from distfsi.solid.kernels.records import (
     DENSITY,
     MASS,
@@ -22,6 +23,8 @@ from distfsi.solid.kernels.records import (
 
 EMPTY, MIXED = -1, -2  # in the place of the side of a search cell
 WIDTH = 1.3  # smoothing length in spacings of the coarser side; with 1 lattices that face each other slip aside
+STICKING = 5.0  # stable steps in which friction stops a slip at best
+TINY = 1e-300  # to divide by
 UNKNOWN = 1e300  # more than can be seen: whatever a particle sees first is touch
 
 
@@ -157,9 +160,52 @@ def begin_touch(begin, end, touching):
         touching[i] = 1.0 if touching[i] == UNKNOWN else touching[i]
 
 
+@driver
+def drag_surfaces(
+    begin, end, chosen, neighbours: Neighbours, particles: Particles, side, tables: SurfaceTables, pressure, traction
+):
+    """traction[i] = what makes friction of the pressure of particle i = chosen[r] (Coulomb): along its slip past the
+    other sides, as large as the pressure allows, or as stops the slip within STICKING stable steps."""
+    bodies = tables.fill.shape[0]
+    for r in range(begin, end):
+        i = chosen[r]
+        slip, normal, seen, stretched = zero_vector(), zero_vector(), 0.0, 0.0
+        for n in range(neighbours.count[r]):
+            j = neighbours.table[r, n]
+            dx, h, other = difference(particles.position, 0, i, j), contact_length(particles, i, j), side[j] % bodies
+            distance2 = dot(dx, dx)
+            if distance2 < 4.0 * h * h:
+                dv = difference(particles.state, VELOCITY, i, j)
+                weight = -volume_of(particles, j) * smoothing_slope(distance2, h)
+                steepness = tables.steepness[side[i] % bodies, other]
+                slip = tuple(slip[d] + weight * dv[d] for d in static_range(DIMENSIONS))
+                normal = tuple(normal[d] + weight * dx[d] / steepness for d in static_range(DIMENSIONS))
+                seen += weight
+        # Slip along the surface, and how much of the motion along it pairs feel.
+        length2 = max(dot(normal, normal), TINY)
+        across = dot(slip, normal) / length2
+        slip = tuple((slip[d] - across * normal[d]) / max(seen, TINY) for d in static_range(DIMENSIONS))
+        speed2 = dot(slip, slip)
+        for n in range(neighbours.count[r]):
+            j = neighbours.table[r, n]
+            dx, h = difference(particles.position, 0, i, j), contact_length(particles, i, j)
+            distance2 = dot(dx, dx)
+            if distance2 < 4.0 * h * h:
+                along = dot(dx, slip)
+                stretched -= volume_of(particles, j) * smoothing_slope(distance2, h) * along * along
+        # Coulomb's law, or rest.
+        size, sound_speed = particles.state[i, SMOOTHING], particles.state[i, SOUND_SPEED]
+        slowest = STICKING * signal_time(size, sound_speed, 0.0, particles.state[i, DENSITY])
+        sliding = FRICTION * 0.5 * pressure[i] * sqrt(length2) * sqrt(speed2)
+        stopping = particles.state[i, DENSITY] * speed2 / slowest
+        factor = min(sliding, stopping) / max(stretched, TINY) if pressure[i] > 0.0 else 0.0
+        store_vector(traction, i, tuple(factor * slip[d] for d in static_range(DIMENSIONS)))
+
+
 @helper
-def push_between(particles: Particles, side, tables: SurfaceTables, pressure, i, j):
-    """Contact force on particle i by j: along the line between them, odd in i and j to the bit."""
+def push_between(particles: Particles, side, tables: SurfaceTables, pressure, traction, i, j):
+    """Contact force on particle i by j: along the line between them, odd in i and j to the bit. Friction is carried by
+    the lines that slip lengthens or shortens."""
     dx, h = difference(particles.position, 0, i, j), contact_length(particles, i, j)
     bodies, distance2 = tables.fill.shape[0], dot(dx, dx)
     own, other = side[i] % bodies, side[j] % bodies
@@ -167,19 +213,22 @@ def push_between(particles: Particles, side, tables: SurfaceTables, pressure, i,
     volumes = volume_of(particles, i) * volume_of(particles, j)
     slope = smoothing_slope(distance2, h) if distance2 < 4.0 * h * h else 0.0
     push = -0.5 * volumes * pressures * slope
+    if FRICTION:
+        push += volumes * slope * dot(difference(traction, 0, i, j), dx)
     return tuple(push * dx[d] for d in static_range(DIMENSIONS))
 
 
 @driver
 def push_surfaces(
     begin, end, chosen, neighbours: Neighbours, particles: Particles, side, tables: SurfaceTables, pressure,
-    acceleration,
+    traction, acceleration,
 ):  # fmt: skip
-    """Add to acceleration[i] that of the contact forces on particle i = chosen[r]; `pressure` (count,) of all."""
+    """Add to acceleration[i] that of the contact forces on particle i = chosen[r]; `pressure` and
+    `traction` of all."""
     for r in range(begin, end):
         i, force = chosen[r], zero_vector()
         for n in range(neighbours.count[r]):
-            push = push_between(particles, side, tables, pressure, i, neighbours.table[r, n])
+            push = push_between(particles, side, tables, pressure, traction, i, neighbours.table[r, n])
             force = tuple(force[d] + push[d] for d in static_range(DIMENSIONS))
         for d in static_range(DIMENSIONS):
             acceleration[i, d] += force[d] / particles.state[i, MASS]
@@ -188,7 +237,7 @@ def push_surfaces(
 @driver
 def heat_surfaces(
     begin, end, dt, chosen, neighbours: Neighbours, particles: Particles, side, tables: SurfaceTables, pressure,
-    velocity, energy,
+    traction, velocity, energy,
 ):  # fmt: skip
     """Advance the energy by half the work of the contact forces in `dt`, at the means of the old and the new
     `velocity` (count, D)."""
@@ -198,5 +247,5 @@ def heat_surfaces(
             j = neighbours.table[r, n]
             before, after = difference(particles.state, VELOCITY, i, j), difference(velocity, 0, i, j)
             mean = tuple(0.5 * (before[d] + after[d]) for d in static_range(DIMENSIONS))
-            power -= 0.5 * dot(push_between(particles, side, tables, pressure, i, j), mean)
+            power -= 0.5 * dot(push_between(particles, side, tables, pressure, traction, i, j), mean)
         energy[i] += dt * power / particles.state[i, MASS]
