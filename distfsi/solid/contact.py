@@ -40,7 +40,7 @@ DRIVERS = (
     kernels.push_surfaces,
     kernels.heat_surfaces,
 )
-SKIN = 0.5  # of the smallest spacing: how far a search looks beyond particles that meet
+SKINS = 0.5, 16.0  # smallest spacings: how far a search looks beyond particles that meet, and how far at most
 POINTS = 2000  # of an integral over a layer of particles
 
 
@@ -67,7 +67,8 @@ class Contact:
         self._kernels, self._device, self._rows = kernels, device, Rows(device, kernels)
         self._cells, self._communicator, self._sides, self._dimensions = cells, communicator, sides, dimensions
         self._tables = SurfaceTables(*map(device.array, surface_tables(spacing, dimensions)))
-        self._skin, self.widening = SKIN * spacing.min(), WIDTH / scene.smoothing
+        self._skins, self.widening = np.array(SKINS) * spacing.min(), WIDTH / scene.smoothing
+        self._skin = 0.0  # of the last search
         self._width = 8 * 3 ** (dimensions - 1)
         self._key: Key | None = None  # for whose particles the others were looked for
         self._last: Particles | None = None
@@ -116,26 +117,38 @@ class Contact:
             if not self._rows.any(mark):
                 return
         self._key, self._last, side = key, particles, self._sides.of(key).read
-        # Search cells of which those around a particle hold all that it may see; and the sides in each.
-        cell, bins = self._cells.sort(particles.position, key.device, self.widening * near.support + self._skin)
-        across = self._cells.strides[1 : self._dimensions]  # rows of three cells lie along x
-        rows = [np.dot(step, across) for step in product((-1, 0, 1), repeat=len(across))]
-        rows = device.array(np.sort(np.array(rows, dtype=np.int64)))
-        cells = bins.start.shape[0] - 1
-        side_of_cell, mark = device.empty(cells, np.int64), device.empty(near.own, np.int8)
-        device.run(self._kernels.find_sides_of_cells, cells, bins.start, bins.order, side, side_of_cell)
-        # Particles that have other sides around them, and whom these see.
-        device.run(self._kernels.mark_meeting, near.own, cell, rows, side_of_cell, side, mark)
-        number, self._chosen = self._rows.marked(mark)
-        given = (self._skin, self._chosen, particles, key.device, side, cell, bins.start, bins.order, rows)
+        # As long as nobody is found, look twice as far as the last time.
+        narrowest, widest = self._skins
+        self._skin = narrowest if self._chosen.shape[0] else float(np.clip(2.0 * self._skin, narrowest, widest))
+        number, *cells = self._have_others_around(near, side)
+        if number and self._skin > narrowest:
+            self._skin = narrowest
+            number, *cells = self._have_others_around(near, side)
+        # Whom they may see.
+        given = (self._skin, self._chosen, particles, key.device, side, *cells)
         while True:
             table, found = device.empty((number, self._width), np.int32), device.empty(number, np.int64)
             self._neighbours = Neighbours(table, found)
             device.run(self._kernels.find_meeting, number, *given, self._neighbours)
-            widest = self._rows.largest(found, 0) if number else 0
-            if widest <= self._width:
+            longest = self._rows.largest(found, 0) if number else 0
+            if longest <= self._width:
                 return
-            self._width = int(1.2 * widest)
+            self._width = int(1.2 * longest)
+
+    def _have_others_around(self, near: Near, side: Any) -> tuple[int, Any, Any, Any, Any]:
+        """Choose the particles that have other sides in the search cells around them: how many there are. And the cell
+        of each particle, where cells start in the order of particles, this order, the offsets of rows of cells."""
+        device, D = self._device, self._dimensions
+        size = self.widening * near.support + self._skin
+        cell, bins = self._cells.sort(near.position, near.plan.key.device, size)
+        rows = [np.dot(step, self._cells.strides[1:D]) for step in product((-1, 0, 1), repeat=D - 1)]
+        rows = device.array(np.sort(np.array(rows, dtype=np.int64)))
+        cells = bins.start.shape[0] - 1
+        side_of_cell, mark = device.empty(cells, np.int64), device.empty(near.own, np.int8)
+        device.run(self._kernels.find_sides_of_cells, cells, bins.start, bins.order, side, side_of_cell)
+        device.run(self._kernels.mark_meeting, near.own, cell, rows, side_of_cell, side, mark)
+        number, self._chosen = self._rows.marked(mark)
+        return number, cell, bins.start, bins.order, rows
 
 
 def surface_tables(spacing: np.ndarray, dimensions: int) -> SurfaceTables:
