@@ -252,6 +252,7 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
+    `friction`: Coulomb's coefficient between bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -263,6 +264,7 @@ class Solid:
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
     obstacles: bool = False
+    friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
@@ -296,7 +298,7 @@ class Time:
     """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
-    `wall_clock_limit` [s] of computing.
+    `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
     """
 
     end: float
@@ -304,6 +306,7 @@ class Time:
     maximum_steps: int | None
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
+    smallest_step: float = 1e-3
 
 
 @dataclass(frozen=True)
