@@ -17,7 +17,7 @@ LAYERS = (
     {"study"},
     {"resources"},
     {"run"},
-    {"simulation", "direct"},
+    {"simulation", "direct", "memory"},
     {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
@@ -25,7 +25,7 @@ LAYERS = (
     {"gauges"},
     {"laws"},
     {"formulas"},
-    {"errors", "narrowing", "__init__"},
+    {"errors", "interrupts", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}
