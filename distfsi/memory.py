@@ -7,8 +7,8 @@ from pathlib import Path
 
 import psutil
 
-from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
+from distfsi.fluid.stages import SSP_RK3
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import Scene
 

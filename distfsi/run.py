@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from distfsi.device.cache import cache_faults
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.cuda import NoGpu, gpu_of
+from distfsi.device.gpu import Gpu
 from distfsi.device.interface import Device
 from distfsi.device.native import compilation
 from distfsi.device.nvrtc import CompileError
@@ -23,6 +26,7 @@ from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.memory import shortage
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.directory import held
 from distfsi.output.journal import Journal
 from distfsi.output.manifest import begin, claim, in_the_way, resume, set_aside, size_of
@@ -44,7 +48,8 @@ def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
 
     `direct`: messages are to lie in the GPU's memory.
     """
-    gpu, faults = None, []
+    gpu: Gpu | None = None
+    faults: list[str] = []
     try:
         gpu = gpu_of(communicator.local_rank, direct)
     except (NoGpu, CompileError) as error:
@@ -53,9 +58,9 @@ def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
     if direct:
         why = refusal(communicator)
         _refuse([f"--gpu-aware-mpi: {why}"] if why else [], communicator)
-        if not arrives(communicator, gpu):
+        if not arrives(communicator, present(gpu)):
             raise InputError(["--gpu-aware-mpi: messages between ranks arrive otherwise than they were sent"])
-    return gpu
+    return present(gpu)
 
 
 def _refuse(faults: list[str], communicator: Communicator) -> None:
@@ -99,8 +104,10 @@ def run(
     files = storage(output.hdf5, communicator)
     _refuse([*cache_faults(), *filter(None, [shortage(scene, communicator)])], communicator)
     progress = Progress(scene.time.end, communicator)
+    for note in scene.notes:
+        progress.say(note)
     threads = threads or threads_of_rank(communicator)
-    device = gpu_of_rank(communicator, direct) if on_gpu else Team(threads)
+    device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None
     performance = Performance(parts_of(scene), timers, communicator)
     journal = Journal(directory, scene, communicator, threads, performance.sums)
@@ -109,7 +116,7 @@ def run(
         held(directory, communicator),
         threadpool_limits(1),
         closing(progress),
-        compilation.told(progress.compiling),
+        compilation.announced(progress.compiling),
     ):
         requests.check_stop_file()
         origin: Restart | Handover | None = _origin(restart, scene, communicator)
@@ -196,7 +203,7 @@ def _report(simulation: Simulation, budget: Budget, progress: Progress, seconds:
 
 
 def advance(
-    simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress
+    simulation: Simulation, records: Records, kept: Mapping[str, Any], requests: Requests, progress: Progress
 ) -> np.ndarray | None:
     """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped.
 

@@ -293,7 +293,7 @@ def test_interpolation_leaves_out_what_is_covered(box):
     for block in range(box.fluid.blocks.local_count):
         x = box.fluid.blocks.cell_centers(block)[0]
         box.fluid.active(kind, block)[..., x > 1.0] = COVERED
-    coupling = SimpleNamespace(kind=DualArray(box.fluid.team, kind))
+    coupling = SimpleNamespace(kind=DualArray(box.fluid.device, kind))
     sampler = FluidSampler(box.fluid, coupling, np.array([[0.99, 0.3], [1.01, 0.3], [0.2, 0.2]]))
     density = sampler.values()[:, 1]
     assert density[0] == 5.0 and np.isnan(density[1]) and density[2] == 5.0
@@ -379,17 +379,24 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='point', position=0.5, every=0}"], "gauges.a.every (--set): 0; must be > 0"),
         (["gauges.a={kind='plane', axis='x', position=0}"], "gauges.a.axis (--set): 'x' in a domain of 1 dimension(s)"),
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
-        (["gauges.a={kind='pont', position=0}"],
-         "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
-         "did you mean 'point'?"),
-        (["gauges.a={kind='point', position=0.5, evry=1}"],
-         "gauges.a.evry (--set): unknown key; expected one of 'kind', 'position', 'every'; did you mean 'every'?"),
+        (
+            ["gauges.a={kind='pont', position=0}"],
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
+            "did you mean 'point'?",
+        ),
+        (
+            ["gauges.a={kind='point', position=0.5, evry=1}"],
+            "gauges.a.evry (--set): unknown key; expected one of 'kind', 'position', 'every'; did you mean 'every'?",
+        ),
         (["output.schlieren=true"], "output.schlieren (--set): needs two or three dimensions"),
         (["output.peaks=3"], "output.peaks (--set): 3; expected a table"),
-        (["output.peaks.ambient=3"], "output.peaks.ambient (--set): unknown key; expected one of 'ambient_pressure', "
-         "'arrival_overpressure'; did you mean 'ambient_pressure'?"),
+        (
+            ["output.peaks.ambient=3"],
+            "output.peaks.ambient (--set): unknown key; expected one of 'ambient_pressure', "
+            "'arrival_overpressure'; did you mean 'ambient_pressure'?",
+        ),
     ],
-)  # fmt: skip
+)
 def test_faults(overrides, expected):
     with pytest.raises(InputError) as caught:
         load(SOD, overrides)

@@ -9,8 +9,9 @@ from scipy.spatial import cKDTree
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, Tube
+from distfsi.scene.fractions import Filled, cell_fractions, corrected
 from distfsi.scene.packing import initial_velocity, pack
-from distfsi.scene.shapes import bounding_box, cell_fractions, contains, dimensions, distance, volume
+from distfsi.scene.shapes import bounding_box, contains, dimensions, distance, volume, volume_within
 
 SHAPES = [
     Box((0.2,), (0.65,)),
@@ -94,6 +95,32 @@ def test_cell_fractions_do_not_depend_on_the_cut(shape):
     whole = cell_fractions(shape, (x, y), spacing)
     parts = [[cell_fractions(shape, (x[i : i + 7], y[j : j + 9]), spacing) for i in (0, 7, 14)] for j in (0, 9, 18)]
     assert (np.block(parts) == whole).all()
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.1, 0.2, 0.5, 1.0, 2.0, 6.4])
+@pytest.mark.parametrize("center", [(7.0, 7.0, 7.0), (7.3, 6.9, 7.17), (0.0, 7.5, 0.0)])
+def test_all_cells_of_a_ball_hold_its_volume(radius, center):
+    """Radius in cells; the last one is cut in half by two ends of the domain."""
+    shape, centers = Ball(center, radius), (np.arange(14) + 0.5,) * 3
+    exact = volume_within(shape, (0.0,) * 3, (14.0,) * 3)
+    assert exact == pytest.approx(volume(shape) / 2 ** center.count(0.0), rel=1e-14)
+    sampled = cell_fractions(shape, centers, (1.0,) * 3)
+    fractions = corrected(sampled, Filled.by(sampled), exact)
+    assert fractions.sum() == pytest.approx(exact, rel=1e-9)
+    assert fractions.min() >= 0.0
+    assert fractions.max() <= 1.0
+    assert ((fractions == 1.0) == (sampled == 1.0)).all()
+
+
+def test_the_volume_that_a_domain_cuts_from_a_shape():
+    whole = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    along = Cylinder((0.5, 0.5, -0.5), (0.5, 0.5, 0.5), 0.25, 0.1)
+    assert volume_within(along, *whole) == pytest.approx(0.5 * volume(along), rel=1e-14)
+    quarter = Cylinder((0.0, 1.0, 0.2), (0.0, 1.0, 0.7), 0.25, 0.0)
+    assert volume_within(quarter, *whole) == pytest.approx(0.25 * volume(quarter), rel=1e-14)
+    assert volume_within(Box((-1.0, 0.2, 0.5), (0.5, 0.4, 2.0)), *whole) == pytest.approx(0.5 * 0.2 * 0.5, rel=1e-14)
+    assert volume_within(Ball((0.1, 0.5, 0.5), 0.2), *whole) is None
+    assert volume_within(Ball((-0.5, 0.5, 0.5), 0.2), *whole) == 0.0
 
 
 # ---- packing ---------------------------------------------------------------------------------------------------------

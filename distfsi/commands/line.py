@@ -17,7 +17,21 @@ from distfsi import __version__
 from distfsi.errors import DistfsiError, InputError
 from distfsi.interrupts import interrupts
 
-COMMANDS = ("run", "check", "compile", "plot", "info", "clean", "examples", "study", "bench", "doctor", "schema")
+COMMANDS = (
+    "run",
+    "check",
+    "compile",
+    "plot",
+    "info",
+    "clean",
+    "examples",
+    "materials",
+    "blast",
+    "study",
+    "bench",
+    "doctor",
+    "schema",
+)
 
 DESCRIPTION = "Shock waves and blasts that hit structures."
 EXAMPLES = """\

@@ -17,10 +17,9 @@ PRIVATE = 0o700
 
 def cache_directory() -> Path:
     """Where compiled modules live: $DISTFSI_CACHE, else the user's cache folder."""
-    root = os.environ.get("DISTFSI_CACHE")
-    if root is None:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
-    return Path(root)
+    if (root := os.environ.get("DISTFSI_CACHE")) is not None:
+        return Path(root)
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
 
 
 def kernel_cache() -> Path:

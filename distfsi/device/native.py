@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.cache import file_name, kernel_cache, locked, write_whole
-from distfsi.device.emit import Emission, Numbers, callees_first
+from distfsi.device.emit import Emission, Numbers, callees_first, given_numbers
 from distfsi.device.fingerprint import fingerprint, texts_depend_on
-from distfsi.device.fold import Bound, flat_values, given_numbers
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
+from distfsi.device.source import Bound, flat_values
 from distfsi.errors import OutputError
 
 OWN_NAME = "?"  # in the place of a module's name in the text that it is named by
@@ -48,7 +48,7 @@ class Compilation:
             self._listener(self.made)
 
     @contextmanager
-    def told(self, listener: Callable[[int], None]) -> Iterator[None]:
+    def announced(self, listener: Callable[[int], None]) -> Iterator[None]:
         """Meanwhile `listener` gets the number of each driver that is about to be compiled."""
         self._listener = listener
         try:
@@ -65,7 +65,11 @@ class Native:
     compiles it for each list of types that it is called with."""
 
     def __init__(
-        self, driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
+        self,
+        driver: Callable[..., Any],
+        constants: Mapping[str, object],
+        bindings: Mapping[str, Bound | type],
+        real: str,
     ):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
         self._compiled = False
@@ -131,12 +135,12 @@ class Native:
         emission = Emission(self.constants, self.bindings)
         root = emission.root(self.driver)
         functions = callees_first(emission.functions)
-        told = hashlib.sha256(texts_depend_on() + self.real.encode())
+        digest = hashlib.sha256(texts_depend_on() + self.real.encode())
         for source, tree in functions:
-            told.update(f"{source.kind} {ast.unparse(tree)}\n".encode())
+            digest.update(f"{source.kind} {ast.unparse(tree)}\n".encode())
         parameters = ", ".join(argument.arg for argument in emission.functions[root][1].args.args)
         lines = [
-            f"# {self.driver.__module__}, {told.hexdigest()}",
+            f"# {self.driver.__module__}, {digest.hexdigest()}",
             "from distfsi.device.runtime import body_of, driver",
             "",
             f"NUMBERS = {tuple(emission.numbers)!r}",

@@ -5,7 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from distfsi.coupling.protocol import Coupling
+from distfsi.diagnostics.watched import Watched
+from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Snapshot
+from distfsi.narrowing import present
+from distfsi.solid.solid import Solid
 
 AXES = "xyz"
 
@@ -17,10 +22,9 @@ class Budget:
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """
 
-    def __init__(self, fluid, solid, coupling):
+    def __init__(self, fluid: Fluid | None, solid: Solid | None, coupling: Coupling | None):
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
-        part = fluid or solid
-        self.dimensions = part.blocks.grid.dimensions
+        self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
         momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
@@ -46,7 +50,7 @@ class Budget:
             self.columns += [f"coupling {cause} {name}" for cause in coupling.causes for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
-    def row(self, simulation) -> dict[str, float | int | str]:
+    def row(self, simulation: Watched) -> dict[str, float | int | str]:
         """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
         masses = self.phases
         values: dict[str, float | int | str] = {
@@ -69,15 +73,15 @@ class Budget:
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
         if self.solid:
-            totals = self.solid.totals()
-            amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])
+            held = self.solid.totals()
+            amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])
             magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
-            magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"])
+            magnitude[masses:-1] = np.sqrt(2.0 * held["mass"] * held["kinetic"])
             balance, size = balance + amounts, size + magnitude
-            values["solid mass [kg]"] = totals["mass"]
-            values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}
-            values["solid kinetic energy [J]"] = totals["kinetic"]
-            values["solid internal energy [J]"] = totals["internal"]
+            values["solid mass [kg]"] = float(held["mass"])
+            values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(held["momentum"])}
+            values["solid kinetic energy [J]"] = float(held["kinetic"])
+            values["solid internal energy [J]"] = float(held["internal"])
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
@@ -104,12 +108,12 @@ class Budget:
         """Go on from a snapshot."""
         self._start, self._scale = snapshot["values"]["start"], snapshot["values"]["scale"]
 
-    def summary(self, simulation) -> str:
+    def summary(self, simulation: Watched) -> str:
         """Collective. One sentence on the conservation error, and on what the coupling has created."""
         row = self.row(simulation)
-        worst = max(abs(row[f"drift {name}"]) for name in self._names)
+        worst = max(abs(float(row[f"drift {name}"])) for name in self._names)
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(row[f"coupling {cause} energy [J]"] for cause in self.coupling.causes)
+            energy = sum(float(row[f"coupling {cause} energy [J]"]) for cause in self.coupling.causes)
             text += f" The coupling created {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
         return text

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from distfsi.diagnostics.sampling import FluidSampler
+from distfsi.diagnostics.watched import Watched
 from distfsi.errors import InputError
 from distfsi.gauges import Gauge, Layer, LayerProbe, Particles, TableProbe
 from distfsi.mesh.blocks import Snapshot
@@ -24,7 +24,7 @@ from distfsi.output.storage import Storage, on_root, storage
 class SampledRun:
     """A simulation as gauges see it (gauges.Run)."""
 
-    def __init__(self, simulation: Any):
+    def __init__(self, simulation: Watched):
         self._simulation = simulation
         self.communicator, self.blocks = simulation.communicator, simulation.blocks
         solid = simulation.scene.solid
@@ -39,11 +39,11 @@ class SampledRun:
         return present(self._simulation.solid)
 
     def fluid_points(self, positions: np.ndarray) -> FluidSampler:
-        return FluidSampler(self._simulation.fluid, self._simulation.coupling, positions)
+        return FluidSampler(present(self._simulation.fluid), self._simulation.coupling, positions)
 
     def fluid_fields(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
         coupling = self._simulation.coupling
-        return self._simulation.fluid.outputs(coupling.covered if coupling else None, chosen)
+        return present(self._simulation.fluid).outputs(coupling.covered if coupling else None, chosen)
 
 
 class TableFile:
@@ -99,7 +99,7 @@ class LayerFiles:
 class GaugeRecorder:
     """Samples a run at the first step at or after each multiple of its interval; the samples are in files at once."""
 
-    def __init__(self, name: str, gauge: Gauge, simulation: Any):
+    def __init__(self, name: str, gauge: Gauge, simulation: Watched):
         """Collective, when the simulation has not begun."""
         self.name = f"gauge {name}"
         self._run = SampledRun(simulation)
@@ -121,7 +121,7 @@ class GaugeRecorder:
         if self._goes_on and faults:
             raise InputError(faults)
 
-    def after_step(self, simulation: Any) -> None:
+    def after_step(self, simulation: Watched) -> None:
         """Collective. Sample the state after a step, or the one at the start, if it is time."""
         if self._goes_on:
             self._files.open(self._last)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
 from distfsi.device.emit import plain
@@ -9,10 +12,31 @@ from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
-from distfsi.scene.description import Fluid, FluidState
-from distfsi.scene.shapes import cell_fractions, contains
+from distfsi.scene.description import Fluid, FluidState, Shape
+from distfsi.scene.fractions import Filled, cell_fractions, corrected
+from distfsi.scene.shapes import bounding_box, contains, volume_within
 
 ALIKE = 1e-9  # part by which pressures differ that are one
+
+
+def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
+    """Collective. How much of each active cell (z, y, x) of the local blocks lies in `shape`, None where nothing does.
+
+    All together they hold the exact volume of what lies in the domain, where that is known.
+    """
+    grid, axes = blocks.grid, blocks.grid.dimensions
+    lower, upper = bounding_box(shape)
+    parts: list[np.ndarray | None] = []
+    for block in range(blocks.local_count):
+        centers, spacing = blocks.cell_centers(block)[:axes], grid.spacing[:axes]
+        ends = zip(centers, spacing, lower, upper, strict=True)
+        near = all(x[-1] + 0.5 * h >= low and x[0] - 0.5 * h <= high for x, h, low, high in ends)
+        parts.append(cell_fractions(shape, centers, spacing).reshape(blocks.extent[block][::-1]) if near else None)
+    filled = Filled.together(Filled.by(part) for part in parts if part is not None)
+    filled = Filled.together(blocks.communicator.allgather(filled))
+    volume = volume_within(shape, grid.lower[:axes], grid.upper[:axes])
+    cells = None if volume is None else volume / math.prod(grid.spacing)
+    return [None if part is None else corrected(part, filled, cells) for part in parts]
 
 
 class InitialState:
@@ -43,27 +67,31 @@ class InitialState:
         return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
 
     def paint(self, blocks: Blocks, field: np.ndarray) -> None:
-        """Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers in part
-        holds that part of the region's mass, momentum and energy; two materials have come to one pressure in it."""
-        dimensions, ghosts = blocks.grid.dimensions, blocks.grid.ghosts
-        states = [self.of(region.state) for region in self.fluid.regions]
-        for block in range(blocks.local_count):
-            centers = blocks.cell_centers(block)[:dimensions]
-            active = [slice(g, g + n) for g, n in zip(ghosts[::-1], blocks.extent[block][::-1], strict=True)]
-            cells = field[block, :, active[0], active[1], active[2]]
-            for region, state in zip(self.fluid.regions, states, strict=True):
-                new = state[:, None, None, None]
-                if region.shape is None:
-                    cells[:] = new
-                    continue
-                part = cell_fractions(region.shape, centers, blocks.grid.spacing[:dimensions]).reshape(cells.shape[1:])
-                mixed = part * new + (1.0 - part) * cells
-                if self.model.phases == 2:
-                    cut = np.argwhere((part > 0.0) & (part < 1.0))
-                    alike = self._alike(state[:, None], cells[:, *cut.T])
-                    for at in map(tuple, cut[~alike]):
-                        mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
-                cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
+        """Collective. Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers
+        in part holds that part of the region's mass, momentum and energy; two materials have come to one pressure in
+        it."""
+        ghosts = blocks.grid.ghosts[::-1]
+        for region in self.fluid.regions:
+            state = self.of(region.state)
+            parts = (
+                [np.ones((1, 1, 1))] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
+            )
+            for block, part in enumerate(parts):
+                active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
+                where: tuple[Any, ...] = (block, slice(None), *active)
+                if part is not None:
+                    self._lay_over(field[where], state, part)
+
+    def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
+        """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""
+        new = state[:, None, None, None]
+        mixed = part * new + (1.0 - part) * cells
+        if self.model.phases == 2:
+            cut = np.argwhere((part > 0.0) & (part < 1.0))
+            alike = self._alike(state[:, None], cells[:, *cut.T])
+            for at in map(tuple, cut[~alike]):
+                mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
+        cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
 
     def _pressure(self, U: np.ndarray) -> np.ndarray:
         return self._primitives(U)[self.model.phases + self.model.dimensions]

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
@@ -70,8 +71,15 @@ class FluidModel:
 
     def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        bound = self.bindings[name]
-        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        if name not in self._made:
+            bound = self.bindings[name]
+            self._made[name] = plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        return self._made[name]
+
+    @cached_property
+    def _made(self) -> dict[str, Callable[..., Any]]:
+        """The formulas that were asked for before."""
+        return {}
 
 
 def fluid_model(scene: Scene) -> FluidModel:
@@ -97,7 +105,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
         "ASYMMETRIC": asymmetric,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
-        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}

@@ -12,7 +12,7 @@ from distfsi.errors import InputError
 from distfsi.narrowing import present
 from distfsi.output.fields import FieldWriter, field_faults
 from distfsi.output.history import History, history_faults
-from distfsi.output.interfaces import Origin
+from distfsi.output.interfaces import Budget, Origin, Performance, Simulation
 from distfsi.output.restart import RestartWriter, Snapshot
 from distfsi.output.schedule import Every
 from distfsi.output.storage import Storage, on_root
@@ -30,7 +30,7 @@ class Records:
     restart  path of the last restart file, or None
     """
 
-    def __init__(self, simulation, budget, performance, storage: Storage):
+    def __init__(self, simulation: Simulation, budget: Budget, performance: Performance, storage: Storage):
         """`budget` gives the history its columns and rows, `performance` those of the file of its name. Nothing is
         touched before `open`."""
         self._simulation, self._storage = simulation, storage

@@ -55,7 +55,7 @@ class Requests:
         self._before = interrupts.listen()
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         interrupts.leave(self._before)
 
     def check_stop_file(self) -> None:

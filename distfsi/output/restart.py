@@ -26,8 +26,9 @@ import h5py
 import numpy as np
 
 from distfsi.errors import InputError
+from distfsi.narrowing import present
 from distfsi.output.checksum import damage
-from distfsi.output.interfaces import Blocks, Communicator
+from distfsi.output.interfaces import Blocks, Communicator, FilledBlocks
 from distfsi.output.manifest import owns, read, remove
 from distfsi.output.scene_text import changes, describe
 from distfsi.output.storage import Piece, Storage, create_dataset, on_root, write_complete
@@ -142,7 +143,7 @@ class Restart:
         cause = damage(self.path, communicator)
         if not cause:
             found = _contents(self.path) if communicator is None or communicator.rank == 0 else None
-            found = communicator.broadcast(found) if communicator else found
+            found = present(communicator.broadcast(found) if communicator else found)
             self.run, self.step, self.time, self._scene, cause = found
         if cause:
             raise InputError([f"{path}: is no complete restart file: {cause}"])
@@ -154,21 +155,21 @@ class Restart:
         """
         return changes(self._scene, describe(scene), self.path)
 
-    def restore(self, parts: Mapping[str, Any], blocks: Blocks, communicator: Communicator) -> None:
+    def restore(self, parts: Mapping[str, Any], blocks: FilledBlocks, communicator: Communicator) -> None:
         """Collective. Bring back the parts that were kept; gauges and peaks that are new stay as they are.
 
         Raises InputError on all ranks when a part kept other things then than it keeps now.
         """
-        present = {name: part.snapshot() for name, part in parts.items()}
+        now = {name: part.snapshot() for name, part in parts.items()}
         shares = {}
         with h5py.File(self.path) as file:
-            faults = list(_misfits(file, present, blocks, communicator))
+            faults = list(_misfits(file, now, blocks, communicator))
             if faults:
                 raise InputError([f"{self.path}: {fault}" for fault in faults])
-            for part in filter(file.__contains__, present):
+            for part in filter(file.__contains__, now):
                 shares[part] = {
                     kind: {
-                        name: READERS[kind](dataset, present[part][kind].get(name), blocks, communicator)
+                        name: READERS[kind](dataset, now[part][kind].get(name), blocks, communicator)
                         for name, dataset in named.items()
                     }
                     for kind, named in file[part].items()
@@ -255,7 +256,7 @@ def _misfits(
     cells = tuple(blocks.grid.cells[::-1])
     for part, snapshot in present.items():
         counts = [len(array) for array in snapshot.get("particles", {}).values()]
-        rows = np.sum(communicator.allgather(counts), axis=0, dtype=np.int64)
+        rows = np.array(communicator.allgather(counts), dtype=np.int64).sum(axis=0)
         if part not in file:
             if not part.startswith(WATCHERS):
                 yield f"holds no '{part}'"
@@ -293,7 +294,7 @@ def _fits(shape: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
     return len(shape) == len(expected) and all(e in (n, None) for n, e in zip(shape, expected, strict=True))
 
 
-def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: Blocks, _) -> np.ndarray:
+def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: FilledBlocks, _: Communicator) -> np.ndarray:
     """Own blocks; what lies beyond the last active cell stays as it is."""
     array = np.array(present)
     for block, origin, extent in zip(array, blocks.origin[:, ::-1], blocks.extent[:, ::-1], strict=True):
@@ -302,12 +303,12 @@ def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: Blocks, _) -
     return array
 
 
-def _read_particles(dataset: h5py.Dataset, _, __, communicator: Communicator) -> np.ndarray:
+def _read_particles(dataset: h5py.Dataset, _: np.ndarray, __: FilledBlocks, communicator: Communicator) -> np.ndarray:
     start, stop = (len(dataset) * rank // communicator.size for rank in (communicator.rank, communicator.rank + 1))
     return dataset[start:stop]
 
 
-def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _, communicator: Communicator) -> np.ndarray:
+def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _: FilledBlocks, communicator: Communicator) -> np.ndarray:
     counts = communicator.allgather(len(present))
     start = sum(counts[: communicator.rank])
     if sum(counts) == len(dataset):
@@ -318,7 +319,7 @@ def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _, communicator: Comm
     return array
 
 
-def _read_values(dataset: h5py.Dataset, *_) -> np.ndarray:
+def _read_values(dataset: h5py.Dataset, *_: object) -> np.ndarray:
     return dataset[()]
 
 

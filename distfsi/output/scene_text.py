@@ -41,7 +41,8 @@ def _flat(value: Any, key: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         if key:
             yield ".".join(key), type(value).__name__
         for field in fields(value):
-            yield from _flat(getattr(value, field.name), (*key, field.name))
+            if field.compare:
+                yield from _flat(getattr(value, field.name), (*key, field.name))
     elif isinstance(value, tuple) and any(is_dataclass(entry) or isinstance(entry, tuple) for entry in value):
         for number, entry in enumerate(value):
             yield from _flat(entry, (*key, getattr(entry, "name", str(number))))

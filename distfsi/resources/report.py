@@ -35,6 +35,7 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("steps", f"about {resources.steps:,}, if no wave becomes faster than the first ones"),
         _line("time", _time(resources, threads, bench)),
     ]
+    lines += [_line("note", text) for text in scene.notes]
     return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
 
 

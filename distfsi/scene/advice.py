@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Cylinder, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 
 AXES, ENDS = "xyz", ("low", "high")
@@ -23,7 +24,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     if scene.output.fields_every > scene.time.end:
         yield "output.fields_every is longer than the run: only the first and the last fields are written"
     if layout:
-        yield from _absent_phases(scene.fluid, layout)
+        yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
@@ -78,28 +79,11 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
 
 
 def thickness(body: Body, domain: Domain) -> float | None:
-    """Smallest extent of a body inside the domain [m]; None for a half space, which has none."""
-    match body.shape:
-        case Box(lower, upper):
-            low, high = np.maximum(lower, domain.lower), np.minimum(upper, domain.upper)
-            return float(np.min(high - low))
-        case HalfSpace():
-            return None
-        case shape:
-            return _extent(shape)
-
-
-def _extent(shape: Shape) -> float | None:
-    """Smallest extent of a shape [m]; None for a half space."""
-    match shape:
-        case Box(lower, upper):
-            return min(b - a for a, b in zip(lower, upper, strict=True))
-        case Ball(_, radius):
-            return 2.0 * radius
-        case Tube(_, inner, outer):
-            return outer - inner
-        case Cylinder(start, end, outer, inner):
-            return min(math.dist(start, end), outer - inner if inner > 0.0 else 2.0 * outer)
+    """Smallest extent of a body inside the domain [m]; None for a half space and for what is composed."""
+    if isinstance(body.shape, Box):
+        low, high = np.maximum(body.shape.lower, domain.lower), np.minimum(body.shape.upper, domain.upper)
+        return float(np.min(high - low))
+    return smallest_extent(body.shape)
 
 
 def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
@@ -119,7 +103,7 @@ def _excess_cells(scene: Scene) -> Iterator[str]:
     """Cells or particles much finer than the smallest thing in the scene; one dimension is cheap at any resolution."""
     if scene.domain.dimensions == 1:
         return
-    extents = [size for shape in _shapes(scene) if (size := _extent(shape)) is not None]
+    extents = [size for shape in _shapes(scene) if (size := smallest_extent(shape)) is not None]
     if scene.fluid and extents:
         across = min(extents) / max(scene.domain.spacing)
         if across > MAXIMUM_CELLS:
@@ -170,6 +154,8 @@ def _turns_around(scene: Scene, axis: int) -> bool:
     shapes, domain = _shapes(scene), scene.domain
     centers = {tuple(s.center[a] for a in across) for s in shapes if isinstance(s, Ball | Tube)}
     flat = [s for s in shapes if isinstance(s, HalfSpace | Box)]
+    if any(isinstance(s, Composed) for s in shapes):
+        return False
     if len(centers) != 1 or not all(_spans(shape, domain, a) for shape in flat for a in across):
         return False
     (center,) = centers

@@ -12,10 +12,11 @@ import numpy as np
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES, stop_file_in
+from distfsi.scene.cloud import Cloud
 from distfsi.scene.description import (
     Ball,
     Body,
-    Box,
+    Composed,
     Cylinder,
     Domain,
     Fluid,
@@ -53,16 +54,16 @@ def check(
 
     `present`: names of the sections of the input, the invalid ones among them.
     """
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_fluid(sections.fluid, fluid)
-    if domain is None:
+    if domain is None or sections.domain is None:
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_inflow(sections.fluid, domain)
     yield from check_output(sections.output, present, domain)
     yield from check_gauges(sections.gauges, present, domain, solid)
@@ -178,11 +179,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
     if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
         yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
-    if turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
+    if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
+        yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
+    elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
         yield Fault((*path, "lattice_angle"), "needs packing = 'lattice', another shape than a half space, 2D or 3D")
     elif turned and _cut_off_axis(shape, domain):
         yield Fault((*path, "lattice_angle"), "a turned lattice has no symmetry planes; expected a whole body")
-    if body.radial_velocity and isinstance(shape, Box | HalfSpace):
+    if body.packing == "relaxed" and isinstance(shape, HalfSpace):
+        yield Fault((*path, "packing"), "a half space has no relaxed packing; expected 'lattice'")
+    if body.radial_velocity and not isinstance(shape, Ball | Tube | Cylinder):
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
@@ -214,9 +219,11 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [2.0 * radius] * domain.dimensions
         case Cylinder(start, end, outer, inner):
             extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
+        case Cloud() as cloud:
+            return float(len(cloud.positions))
         case shape:
             lower, upper = bounding_box(shape)
-            extents = np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower)
+            extents = list(np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower))
     return math.prod(max(float(extent), 0.0) / body.spacing for extent in extents)
 
 
@@ -229,7 +236,7 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         slack = 1e-6 * body.spacing
         beyond = (lower[axis] < domain.lower[axis] - slack, upper[axis] > domain.upper[axis] + slack)
         for side in range(2):
-            if beyond[side] and ends[side] != "symmetry":
+            if beyond[side] and math.isfinite((lower, upper)[side][axis]) and ends[side] != "symmetry":
                 where = f"the {SIDES[side]} {AXES[axis]} end of the domain"
                 yield Fault(path, f"reaches beyond {where}, which is '{ends[side]}'; only 'symmetry' may cut a body")
 
@@ -246,7 +253,7 @@ def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) ->
 
 def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
     """Bodies in a fluid are tight, and faces look no farther than to the next cells."""
-    if given.drop_below is not None and given.scheme == "paper":
+    if given.drop_below is not None and given.scheme == "immersed_boundary":
         yield Fault(("coupling", "drop_below"), "needs scheme 'cut_cells'")
     if fluid.reconstruction == "weno5":
         yield Fault(("fluid", "reconstruction"), "'weno5' looks past the cells beside a solid; expected another")

@@ -8,7 +8,10 @@ from typing import Any
 
 from distfsi.scene.faults import Fault, Path, dotted, one_of
 
-NAMED = {("fluid", "phases"): "phase", ("solid", "bodies"): "body"}  # tables of names, which an override cannot add to
+NAMED: dict[Path, str] = {
+    ("fluid", "phases"): "phase",
+    ("solid", "bodies"): "body",
+}  # tables of names, which an override cannot add to
 
 
 def apply(data: dict[str, Any], overrides: Iterable[str]) -> tuple[list[Path], list[Fault]]:

@@ -11,7 +11,7 @@ import math
 import re
 from fractions import Fraction
 
-Dimension = tuple[int, int, int, int]
+Dimension = tuple[int, ...]
 Unit = tuple[Fraction, Dimension]
 
 NUMBER = (0, 0, 0, 0)
@@ -123,6 +123,14 @@ def to_si(value: object, unit: str) -> float:
     if not math.isfinite(number):
         raise ValueError("is not finite")
     return number
+
+
+def length_factor(unit: str) -> Fraction:
+    """Metres in a `unit`. Raises ValueError when it is none of length."""
+    factor, dimension = parse_unit(unit)
+    if dimension != LENGTH:
+        raise ValueError(f"has the unit '{unit}', needs one of length")
+    return factor
 
 
 def _number_to_float(value: object, unit: str) -> float:

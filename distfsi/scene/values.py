@@ -1,12 +1,12 @@
 """Kinds of values in an input: quantities with units, vectors, counts, names; and the tables that hold them.
 
-Validation gets a context {"dimensions": int | None, "phases": names}, taken from the raw input, so that vectors and
-names are checked where they stand.
+Validation gets a context {"dimensions": int | None, "phases": names, "folder": path}, taken from the raw input, so that
+vectors and names are checked where they stand.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -37,7 +37,8 @@ def quantity(unit: str, **limits: float) -> Any:
     """Type of a number in `unit` within pydantic's `limits` (gt, ge, lt, le), given in SI or as a text with a unit."""
     words = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
     shown = {"type": ["number", "string"], "unit": unit} | {words[key]: limit for key, limit in limits.items()}
-    return Annotated[float, Field(**limits), BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(shown)]
+    field: Any = Field(**cast(Any, limits))
+    return Annotated[float, field, BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(shown)]
 
 
 def vector(unit: str) -> Any:

@@ -33,9 +33,8 @@ def look_at_face(U, at, axis, grid: BlockGrid, P, T):
 
 
 @helper
-def flux_of_face(P, T, F, dt, axis, grid: BlockGrid):
-    """F = flux through the face that was looked at, by the rows of the stage, which takes `dt` [s]."""
-    rate = real(dt / grid.spacing[axis])
+def flux_of_face(P, T, F, rate, axis):
+    """F = flux through the face that was looked at, by the rows of the stage; rate: dt/h [s/m]."""
     face = Faces(
         cell=LINE + 1,
         variables=BOX,
@@ -47,6 +46,6 @@ def flux_of_face(P, T, F, dt, axis, grid: BlockGrid):
         flux=0,
         rows=2,
         axis=axis,
-        rate=real(2 * DIMENSIONS) * rate,
+        rate=real(2 * DIMENSIONS) * real(rate),
     )
     face_fluxes(P, T, F, face, 1, 1)
