@@ -20,7 +20,7 @@ from distfsi.diagnostics.derived import DerivedFields
 from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks
 from distfsi.diagnostics.schlieren import Schlieren
-from distfsi.errors import Diverged, StepFailed, StepTooShort
+from distfsi.errors import Diverged, InputError, StepFailed, StepTooShort
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -190,6 +190,16 @@ class Simulation:
         with self.timers("output"):
             for watcher in self.watchers:
                 watcher.after_step(self)
+
+    def check_restored(self) -> None:
+        """Collective. Raise InputError on all ranks when a restart file has left a state from which no step can start,
+        or when the samples of a gauge cannot be continued."""
+        faults = self._faults(self.coupling.covered if self.coupling else None)
+        if faults:
+            raise InputError([f"the restart file holds no valid state: {faults[0]}"])
+        for watcher in self.watchers:
+            if isinstance(watcher, GaugeRecorder):
+                watcher.check()
 
     def name_limit(self) -> str:
         """Collective. What set the last time step; if the fluid did, where it was fastest and how fast; if the solid

@@ -11,7 +11,8 @@ from distfsi.coordinates import Coordinates
 from distfsi.errors import InputError
 from distfsi.laws.registry import laws_of
 from distfsi.narrowing import present
-from distfsi.output.restart import Restart, describe, newest_restart
+from distfsi.output.restart import Restart, newest_restart
+from distfsi.output.scene_text import describe
 from distfsi.scene.description import Scene
 
 PHASE = "fluid.phases."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -179,8 +180,15 @@ def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:
         given.schlieren,
         given.hdf5,
         given.restart_every,
-        given.stop_file or f"{directory}/stop",
+        stop_file_in(directory, given.stop_file),
+        given.restart_at_end,
     )
+
+
+def stop_file_in(directory: str, stop_file: str) -> str:
+    """The stop file's name in the output directory, also where it is given as a path there; any other as given."""
+    folder, name = os.path.split(stop_file)
+    return name if folder and os.path.abspath(folder) == os.path.abspath(directory) else stop_file
 
 
 def build_sources(gravity: tuple[float, ...] | None, given: Mapping[str, SourceInput]) -> tuple[Source, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
 from distfsi.narrowing import present
-from distfsi.scene.build import AXES, SIDES
+from distfsi.scene.build import AXES, SIDES, stop_file_in
 from distfsi.scene.cloud import Cloud
 from distfsi.scene.coordinate_checks import check_coordinates
 from distfsi.scene.description import (
@@ -46,6 +46,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
+LONGEST_NAME = 255  # bytes of a file's name
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -292,7 +293,11 @@ def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fl
 
 
 def check_output(given: OutputInput, present: Container[str], domain: Domain) -> Iterator[Fault]:
-    """Fields of the cells need cells."""
+    """Fields of the cells need cells; the stop file lies in the output directory."""
+    stop_file = stop_file_in(given.directory or "", given.stop_file)
+    if stop_file in ("", ".", "..") or {"/", "\0"} & set(stop_file) or len(stop_file.encode()) > LONGEST_NAME:
+        text = f"{given.stop_file[:LONGEST_NAME]!r}; expected the name of a file, which lies in the output directory"
+        yield Fault(("output", "stop_file"), text)
     for key in ("peaks", "schlieren"):
         if getattr(given, key) and "fluid" not in present:
             yield Fault(("output", key), "needs a fluid")

@@ -323,8 +323,8 @@ class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
     `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
-    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
-    is by a file called `stop_file`.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only at the end (`restart_at_end`)
+    and when the run is stopped, as it is by a file called `stop_file` in the directory.
     """
 
     directory: str
@@ -335,6 +335,7 @@ class Output:
     hdf5: Hdf5 = "mpi-io"
     restart_every: float = 0.0
     stop_file: str = "stop"
+    restart_at_end: bool = True
 
 
 @dataclass(frozen=True)

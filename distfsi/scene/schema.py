@@ -298,10 +298,13 @@ class OutputInput(Table):
         description='who writes: all ranks by MPI-IO, all ranks by an h5py with MPI ("mpio"), or rank 0 ("gather")',
     )
     restart_every: quantity("s", ge=0.0) = Field(
-        1800.0, description="computing time between restart files, of which two are kept; 0: only when stopped early"
+        1800.0, description="computing time between restart files, of which two are kept; 0: only at the end"
     )
-    stop_file: str | None = Field(
-        None, description="a file that, when it appears, stops the run early; default: stop in the output directory"
+    restart_at_end: bool = Field(
+        True, strict=True, description="write a restart file at the end, from which the run can be extended"
+    )
+    stop_file: str = Field(
+        "stop", description="a file in the output directory that, when it appears, stops the run early"
     )
 
 
