@@ -8,6 +8,7 @@ at once.
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import sys
 from collections.abc import Sequence
@@ -50,9 +51,18 @@ def parser() -> argparse.ArgumentParser:
 def main(words: Sequence[str]) -> None:
     """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
     if words and words[0] not in COMMANDS and not words[0].startswith("-"):
+        if near := _mistyped(words[0]):
+            parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
         words = ["run", *words]
     arguments = parser().parse_args(words)
     arguments.execute(arguments)
+
+
+def _mistyped(word: str) -> str | None:
+    """The command that a word is meant to be, if it is no input file but resembles one."""
+    if "." in word or os.sep in word or os.path.exists(word):
+        return None
+    return next(iter(difflib.get_close_matches(word.lower(), COMMANDS, n=1)), None)
 
 
 def command() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 from distfsi.mesh.blocks import Snapshot
 
 AXES = "xyz"
+SLOW = 1e-3  # of the speed of sound: where all is slower, errors of the momentum are measured by this speed
 
 
 class Budget:
-    """Of a run: fluid + solid + left through boundaries - created by the coupling is constant, but for the conservation
-    error.
+    """Of a run: fluid + solid + left through boundaries - given to the fluid by the body force - created by the coupling
+    is constant, but for the conservation error.
 
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """
@@ -32,6 +33,8 @@ class Budget:
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
         self.columns += [f"left {name}" for name in self.conserved]
+        if fluid and fluid.force:
+            self.columns += [f"body force {name}" for name in self.conserved]
         if solid:
             self.columns += [
                 "solid mass [kg]",
@@ -47,7 +50,8 @@ class Budget:
         self.columns += [f"drift {name}" for name in self._names]
 
     def row(self, simulation) -> dict[str, float | int | str]:
-        """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
+        """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far; of the
+        momentum at least to that of a slow motion."""
         masses = self.phases
         values: dict[str, float | int | str] = {
             "step": simulation.steps,
@@ -65,14 +69,17 @@ class Budget:
         left = np.zeros(len(self.conserved))
         if self.fluid:
             totals, magnitude = self.fluid.totals(self.coupling.volume if self.coupling else None)
+            magnitude[masses:-1] += SLOW * np.sqrt(2.0 * magnitude[:masses].sum() * magnitude[-1])
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.force:
+                add("body force", self.fluid.force.totals(), -1.0)
         if self.solid:
             totals = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])
             magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
-            magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"])
+            magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"]) + SLOW * totals["acoustic"]
             balance, size = balance + amounts, size + magnitude
             values["solid mass [kg]"] = totals["mass"]
             values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}

@@ -46,6 +46,7 @@ BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed num
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
 ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
+HYDROSTATIC = Symbol("whether a body force acts, whose weight the pressures of cells beside each other differ by")
 TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
@@ -62,6 +63,8 @@ reconstructed = chosen(
     "cells around and with one -> increments from its low face to its mean, from there to its high face",
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
+falls = chosen("falls", "time step, and that over the size of a cell along three axes -> g h along each [m2/s2]")
+beyond_rest = chosen("beyond_rest", "pressures and densities of cells around one, g h -> pressures without the weight")
 primitives = chosen("primitives", "conserved state -> primitive state")
 conserved = chosen("conserved", "primitive state -> conserved state")
 face_flux = chosen("face_flux", "left and right primitive states, normal velocity first; pressure jump -> fluxes")

@@ -17,7 +17,7 @@ class LineGauge(Gauge):
 
     start: tuple[float, ...] = vector("m", "first point", key="from")
     end: tuple[float, ...] = vector("m", "last point", key="to")
-    points: int = entry("number of points, the ends included", at_least=2)
+    points: int = entry("number of points, the ends included", at_least=2, at_most=1_000_000)
     every: float | None = each_hundredth()
 
     per_step = False

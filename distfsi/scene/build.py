@@ -75,6 +75,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.riemann,
         given.model,
         given.sharpening,
+        given.hydrostatic_level,
     )
 
 

@@ -108,7 +108,11 @@ class Region:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`."""
+    """The compressible flow. One phase: Euler; two: `model`.
+
+    hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
+    regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
+    """
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
@@ -119,6 +123,7 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    hydrostatic_level: float | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

@@ -78,7 +78,7 @@ class CutCells:
         self._staircase = scene.coupling.scheme == "stairs"
         self._particles = SolidParticles(solid)
         self._cell_volume = float(np.prod(grid.spacing))
-        self._initial = InitialState(present(scene.fluid), model)
+        self._initial = InitialState(present(scene.fluid), model, grid)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))

@@ -19,7 +19,7 @@ from distfsi.coupling.cut_cells.kernels.records import (
 from distfsi.coupling.cut_cells.kernels.redistribution import repeat_lane
 from distfsi.coupling.formulas.moving_wall import normal_of, stage_content, wall_impedance, wall_pressure
 from distfsi.coupling.kernels.cells import FLUID
-from distfsi.coupling.kernels.faces import BOX, LINE, flux_of_face, look_at_face
+from distfsi.coupling.kernels.faces import BOX, LINE, fall_along, flux_of_face, look_at_face
 from distfsi.device.markers import driver, helper, load, real, row, store, workspace
 from distfsi.fluid.kernels.records import Faces, position_of
 from distfsi.fluid.kernels.rows import face_fluxes, increments_row, primitives_row
@@ -149,7 +149,7 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
             primitives_of_faces(Q, P)
             # their reconstruction, which ends at the wall
             c = (LINE + 1) * LANES
-            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
+            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES, fall_along(axis, dt, grid))
             for i in range(n):
                 stop_slopes(T, i, seen[faces[first + i]] - 1)
             # fluxes
@@ -326,7 +326,7 @@ def account_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls,
         low_cell = side_cells[n] if high == 1 else side_cells[n] - grid.steps[axis]
         amount = (2 * high - 1) * (weight * cell_volume(grid) / grid.spacing[axis])
         for seen in range(2):  # first as the stage does, which sees no wall
-            look_at_face(U, low_cell, axis, grid, P, T)
+            look_at_face(U, low_cell, axis, dt, grid, P, T)
             if seen == 1:
                 amount = -amount * stop_at_wall(walls, low_cell, axis, T, grid)
             if amount != 0.0:
