@@ -20,7 +20,7 @@ from tubes import advance, fields, scene_of, start
 
 WALLS = ("wall", "wall")
 G = 9.81
-DENSE = Nasg(gamma=1.19, p_inf=7.028e8, covolume=6.61e-4, heat=-1.177788e6)
+DENSE = Nasg(gamma=1.19, p_inf=7.028e8, covolume=6.61e-4, q=-1.177788e6)
 
 
 def column(eos, states, cells, height, end, steps=None, ends=WALLS, **more):

@@ -12,8 +12,8 @@ SLOW = 1e-3  # of the speed of sound: where all is slower, errors of the momentu
 
 
 class Budget:
-    """Of a run: fluid + solid + left through boundaries - given to the fluid by the body force - created by the coupling
-    is constant, but for the conservation error.
+    """Of a run: fluid + solid + left through boundaries - given to the fluid by the body force - created by the
+    coupling is constant, but for the conservation error.
 
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """

@@ -49,8 +49,8 @@ class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step. stages: those that make a step. force: what the body force has given, if there is one. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
-    cells; of the others.
+    step. stages: those that make a step. force: what the body force has given, if there is one. ready_tiles,
+    waiting_tiles: numbers of the tiles that need no other rank's cells; of the others.
     """
 
     def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):

@@ -31,8 +31,8 @@ class WeighedGhosts:
         )
 
     def weigh(self, state: Any, waiting: bool) -> None:
-        """Give the ghosts of a `state` their pressure: of the blocks that have been `waiting` for other ranks, or of the
-        rest."""
+        """Give the ghosts of a `state` their pressure: of the blocks that have been `waiting` for other ranks, or of
+        the rest."""
         columns = self._waiting if waiting else self._ready
         self._device.run(self._kernel, columns.shape[0], columns, state, self._spacing)
 

@@ -217,7 +217,7 @@ class InitialState:
             path = solve_ivp(
                 slope, (known.pressure, way[-1]), [known.density], method="LSODA", t_eval=way, rtol=1e-9, atol=1e-12
             )
-            reached = {p: rho for p, rho in zip(way.tolist(), path.y[0].tolist(), strict=False)}
+            reached = dict(zip(way.tolist(), path.y[0].tolist(), strict=False))
             places = pressures > known.pressure if way[-1] > known.pressure else pressures < known.pressure
             found[places] = [reached.get(p, np.nan) for p in pressures[places].tolist()]
         return found

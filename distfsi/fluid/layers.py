@@ -54,7 +54,7 @@ class Layers:
         )
 
     def of(self, first: int, count: int) -> tuple[slice, tuple[int, ...]]:
-        """Which layers `count` cells from cell `first` of the grid on are in, and their shape beside cells (z, y, x)."""
+        """Which layers `count` cells from cell `first` of the grid on are in; their shape beside cells (z, y, x)."""
         shape = tuple(count if 2 - self.axis == d else 1 for d in range(3))
         return slice(first, first + count), shape
 

@@ -7,8 +7,8 @@ from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS, FRACTIONAL, PHASES,
 
 @driver
 def account_force(begin, end, U, volumes, given, start, extent, rows, time):
-    """given[r] (D + 1,) grows by the momentum and the work that the body force gives in `time` [s] to the cells of row r
-    in the states U, per volume of a cell.
+    """given[r] (D + 1,) grows by the momentum and the work that the body force gives in `time` [s] to the cells of row
+    r in the states U, per volume of a cell.
 
     start: index of a block's first active cell within one variable; rows: of a block, along y; all of a block follow
     each other.

@@ -26,8 +26,8 @@ def weigh_ghosts(begin, end, columns, U, spacing):
     """After the ghosts of U are filled: those beyond the ends of the domain get the pressure of the cell that they
     repeat or mirror, and the weight of the fluid between.
 
-    columns (n, 4): AT the last active cell, OUT the step in memory from there outwards, AXIS, and whether the ghosts are
-    MIRRORED; spacing (3,) [m].
+    columns (n, 4): AT the last active cell, OUT the step in memory from there outwards, AXIS, and whether the ghosts
+    are MIRRORED; spacing (3,) [m].
     """
     cells = U.shape[2] * U.shape[3] * U.shape[4]
     for n in range(begin, end):

@@ -68,8 +68,8 @@ def density_at(P, c, sp):
 
 @helper
 def pressure_increments(P, c, sp, step, fall):
-    """Increments of the pressure in a cell whose first variable is at P[c], beside the weight of fluid at rest, with g h
-    along the row, and that weight."""
+    """Increments of the pressure in a cell whose first variable is at P[c]: beside the weight of fluid at rest, with
+    g h along the row, and that weight."""
     pressure = (PHASES + DIMENSIONS) * sp
     p = tuple(load(P, c + pressure + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
     rho = tuple(density_at(P, c + k * step, sp) for k in static_range(1 - GHOSTS, GHOSTS))
@@ -81,8 +81,8 @@ def pressure_increments(P, c, sp, step, fall):
 @row
 def increments_row(P, T, p, sp, step, t, st, n, fall):
     """T[t …] = increments of the primitives of the n cells at P[p …] from the mean to the high face along the axis
-    whose cells are `step` apart, then where they differ those from the low face to the mean; `fall`: g h of a body force
-    along that axis, if there is one."""
+    whose cells are `step` apart, then where they differ those from the low face to the mean; `fall`: g h of a body
+    force along that axis, if there is one."""
     for v in static_range(VARIABLES):
         for i in range(n):
             c = p + v * sp + i
