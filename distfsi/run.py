@@ -27,6 +27,7 @@ from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
+from distfsi.scene.advice import warnings
 from distfsi.scene.description import Scene
 from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.step import parts_of
@@ -96,6 +97,9 @@ def run(
     prepare_directory(directory, communicator)
     if restart is None:
         set_aside(directory, communicator)
+    if communicator.rank == 0:
+        for text in warnings(scene):
+            print(f"warning: {text}", flush=True)
     progress = Progress(scene.time.end, communicator)
     threads = threads or threads_of_rank(communicator)
     device = gpu_of_rank(communicator, direct) if on_gpu else Team(threads)

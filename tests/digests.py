@@ -10,6 +10,7 @@ import csv
 import hashlib
 import json
 import platform
+import re
 import sys
 import tempfile
 import time
@@ -212,6 +213,7 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     """The columns of a table as text, in which floats have all their bits."""
     with path.open(newline="") as file:
         header, *rows = csv.reader(file)
+    header = [re.sub(r"(kg|N s|J|N)/m2?\]", r"\1]", name) for name in header]  # units that the table does not have
     return {name: np.array([row[i].encode() for row in rows], "S") for i, name in enumerate(header)}
 
 

@@ -191,7 +191,7 @@ def kept(tmp_path, monkeypatch):
 
 def test_a_bench_is_kept_for_this_version_only(kept, monkeypatch):
     assert bench.kept_bench() is None
-    bench._keep({"distfsi": bench.__version__, "ranks": 1})
+    bench._write(bench._kept_file(), {"distfsi": bench.__version__, "ranks": 1})
     assert bench.kept_bench()["ranks"] == 1
     monkeypatch.setattr(bench, "__version__", "another")
     assert bench.kept_bench() is None

@@ -138,9 +138,9 @@ def test_the_force_on_a_body_is_its_rate_of_momentum(tubes):
     gauge = read_history(tubes[1] / "gauges/tube.csv")
     dt = np.diff(gauge["time [s]"])
     for axis in "xy":
-        force, momentum = gauge[f"force_{axis} [N]"], gauge[f"momentum_{axis} [N s]"]
+        force, momentum = gauge[f"force_{axis} [N/m]"], gauge[f"momentum_{axis} [N s/m]"]
         assert np.isnan(force[0]) and momentum[0] == 0.0
-        scale = np.abs(gauge["momentum_x [N s]"]).max()
+        scale = np.abs(gauge["momentum_x [N s/m]"]).max()
         assert np.abs(np.diff(momentum) - force[1:] * dt).max() < 1e-9 * scale
     moved = np.cumsum(gauge["velocity_x [m/s]"][:-1] * dt)
     assert gauge["displacement_x [m]"][1:] == pytest.approx(moved, rel=1e-6, abs=1e-12)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from distfsi.gauges import per_extent
 from distfsi.mesh.blocks import Snapshot
 
 AXES = "xyz"
@@ -23,9 +24,10 @@ class Budget:
         part = fluid or solid
         self.dimensions = part.blocks.grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
-        momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
-        masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
-        self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
+        self._kg, impulse, self._joule = (per_extent(unit, self.dimensions) for unit in ("kg", "N s", "J"))
+        self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
+        masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]
+        self.conserved = [*masses, *self._momentum, f"energy [{self._joule}]"]
         self._names = [name.split(" [")[0] for name in self.conserved]
         self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
@@ -37,10 +39,10 @@ class Budget:
             self.columns += [f"body force {name}" for name in self.conserved]
         if solid:
             self.columns += [
-                "solid mass [kg]",
-                *(f"solid {m}" for m in momentum),
-                "solid kinetic energy [J]",
-                "solid internal energy [J]",
+                f"solid mass [{self._kg}]",
+                *(f"solid {name}" for name in self._momentum),
+                f"solid kinetic energy [{self._joule}]",
+                f"solid internal energy [{self._joule}]",
                 *(["solid pieces"] if "piece" in solid.columns else []),
             ]
         if coupling:
@@ -81,10 +83,10 @@ class Budget:
             magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
             magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"]) + SLOW * totals["acoustic"]
             balance, size = balance + amounts, size + magnitude
-            values["solid mass [kg]"] = totals["mass"]
-            values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(totals["momentum"])}
-            values["solid kinetic energy [J]"] = totals["kinetic"]
-            values["solid internal energy [J]"] = totals["internal"]
+            values[f"solid mass [{self._kg}]"] = totals["mass"]
+            values |= {f"solid {name}": m for name, m in zip(self._momentum, totals["momentum"], strict=True)}
+            values[f"solid kinetic energy [{self._joule}]"] = totals["kinetic"]
+            values[f"solid internal energy [{self._joule}]"] = totals["internal"]
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
@@ -117,6 +119,7 @@ class Budget:
         worst = max(abs(row[f"drift {name}"]) for name in self._names)
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(row[f"coupling {cause} energy [J]"] for cause in self.coupling.causes)
-            text += f" The coupling created {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
+            energy = sum(row[f"coupling {cause} {self.conserved[-1]}"] for cause in self.coupling.causes)
+            share = 100 * energy / self._scale[-1]
+            text += f" The coupling created {energy:.4g} {self._joule} ({share:.2g} % of the energy)."
         return text

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.gauges import AXES, Gauge, Kept, Run, TableProbe, each_step
+from distfsi.gauges import AXES, Gauge, Kept, Run, TableProbe, each_step, per_extent
 from distfsi.laws.law import entry
 
 QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": "N s"}
@@ -36,7 +36,8 @@ class BodyProbe(TableProbe):
 
     def __init__(self, gauge: BodyGauge, run: Run):
         axes = AXES[: run.particles.dimensions]
-        self.columns = [f"{name}_{axis} [{unit}]" for name, unit in QUANTITIES.items() for axis in axes]
+        units = {name: per_extent(unit, len(axes)) if "N" in unit else unit for name, unit in QUANTITIES.items()}
+        self.columns = [f"{name}_{axis} [{unit}]" for name, unit in units.items() for axis in axes]
         self._body = run.bodies.index(gauge.body)
         self._start = run.particles.body_totals(self._body)["center"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +116,18 @@ class Film:
         high = np.max([position.max(axis=0) for position in corners], axis=0)
         margin = 0.05 * (high - low).max() * (high > low)
         return low - margin, high + margin
+
+
+def as_line(frame: Frame) -> Frame | None:
+    """A frame of one row or one column of cells as one of a line; None where there are more."""
+    count = next(iter(frame.cells.values())).shape[:2] if frame.cells else (0, 0)
+    left, right, bottom, top = frame.extent
+    if count[0] == 1:
+        return replace(frame, extent=(left, right, bottom, bottom))
+    if count[1] == 1:
+        cells = {name: np.swapaxes(values, 0, 1) for name, values in frame.cells.items()}
+        return replace(frame, cells=cells, extent=(bottom, top, left, left), axes=frame.axes[::-1])
+    return None
 
 
 def telling_plane(cells: Path, particles: Path) -> Plane | None:
