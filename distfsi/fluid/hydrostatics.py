@@ -22,7 +22,7 @@ class WeighedGhosts:
     def __init__(self, blocks: Blocks, exchange: GhostExchange, device: Device, model: FluidModel, real: str):
         self._device = device
         self._kernel = device.build([weigh_ghosts], model.constants, model.bindings, real).weigh_ghosts
-        self._spacing = device.array(np.array(blocks.grid.spacing))
+        self._spacing = device.array(np.array(blocks.grid.spacing, dtype=real))
         forces = model.body_force.acceleration
         axes = [axis for axis in range(blocks.grid.dimensions) if forces[axis] != 0.0]
         self._ready, self._waiting = (

@@ -89,7 +89,8 @@ class InitialState:
         ghosts = blocks.grid.ghosts[::-1]
         for region in self.fluid.regions:
             states = self._states(region.state)
-            parts = [np.ones(1)] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
+            whole = [np.ones((1, 1, 1))] * blocks.local_count
+            parts = whole if region.shape is None else fractions(blocks, region.shape)
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
                 if part is not None:
