@@ -27,8 +27,8 @@ from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
-from distfsi.scene.advice import warnings
 from distfsi.scene.description import Scene
+from distfsi.scene.warnings import warnings
 from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.step import parts_of
 

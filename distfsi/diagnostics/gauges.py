@@ -34,6 +34,17 @@ class SampledRun:
         return self._simulation.dt
 
     @property
+    def time(self) -> float:
+        return self._simulation.time
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        fluid, peaks = present(self._simulation.scene.fluid), self._simulation.scene.output.peaks
+        if fluid.hydrostatic_level is not None:
+            return None
+        return peaks.ambient_pressure if peaks else fluid.regions[0].state.pressure
+
+    @property
     def particles(self) -> Particles:
         return present(self._simulation.solid)
 

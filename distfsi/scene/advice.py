@@ -7,18 +7,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.gauges import per_extent
-from distfsi.scene.charges import ENOUGH, Charge, charges, gap_between, losses
 from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
-from distfsi.scene.plausible import far_outside
 from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
+from distfsi.scene.warnings import warnings
 
 AXES, ENDS = "xyz", ("low", "high")
 BEST_SPACING = 0.5  # of a fluid cell
 FEWEST_PARTICLES = 4  # through a body's thickness
 MAXIMUM_CELLS = 500  # across the smallest thing
-MISPLACED = 0.01  # part of a charge that may be missing in its cells
 UNREACHED = 0.25  # of the domain's length that no wave reaches
 
 
@@ -36,30 +33,6 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
             yield f"body '{body.name}': {text}"
     yield from _excess_cells(scene)
     yield from _excess_dimensions(scene)
-
-
-def warnings(scene: Scene) -> Iterator[str]:
-    """One sentence for each thing that makes results wrong and that no check refuses."""
-    for charge in charges(scene):
-        for text in _charge(charge, scene):
-            yield f"charge '{charge.name}': {text}"
-    yield from far_outside(scene.fluid, _bodies(scene))
-
-
-def _charge(charge: Charge, scene: Scene) -> Iterator[str]:
-    if charge.cells < ENOUGH:
-        peak, impulse = losses(charge.cells)
-        yield (
-            f"{charge.cells:.2g} cells per radius, which costs about {100.0 * peak:.0f} % of the peak overpressure and "
-            f"{100.0 * impulse:.0f} % of the impulse; {ENOUGH} are better"
-        )
-    if abs(charge.placed - charge.meant) > MISPLACED * charge.meant:
-        per = per_extent("kg", scene.domain.dimensions)
-        yield f"its cells hold {charge.placed:.4g} of the {charge.meant:.4g} {per} that are meant: the rest is hidden"
-    for body in _bodies(scene):
-        overlap = -gap_between(charge, body, scene.domain)
-        if overlap > 0.5 * min(scene.domain.spacing):
-            yield f"reaches {overlap:.3g} m into body '{body.name}'"
 
 
 def _shape_of_cells(domain: Domain) -> Iterator[str]:

@@ -10,6 +10,7 @@ from distfsi.scene.faults import Fault, Path, dotted, one_of
 
 NAMED = {("fluid", "phases"): "phase", ("solid", "bodies"): "body"}  # tables of names, which an override cannot add to
 TABLES = {*NAMED, ("gauges",), ("sources",)}  # all tables of names
+SHOWN = 100  # letters of a setting in a fault
 REMOVED = "none"  # the value that removes a table
 
 
@@ -24,11 +25,11 @@ def apply(data: dict[str, Any], overrides: Iterable[str]) -> tuple[list[Path], l
         key, equals, value = text.partition("=")
         path = tuple(int(part) if _is_index(part) else part for part in key.strip().split("."))
         if not equals or "" in path:
-            faults.append(Fault(("--set",), f"'{text}'; expected key.path=value"))
+            faults.append(Fault(("--set",), f"'{text[:SHOWN]}'; expected key.path=value"))
         elif (trouble := _set(data, path, _value(value.strip()))) is None:
             paths.append(path)
         else:
-            faults.append(Fault(("--set",), f"'{text}'; {trouble}"))
+            faults.append(Fault(("--set",), f"'{text[:SHOWN]}'; {trouble}"))
     return paths, faults
 
 

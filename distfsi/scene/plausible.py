@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.scene.description import Body, Fluid
-from distfsi.scene.signals import solid_sound
-from distfsi.scene.thermodynamics import energy
+from distfsi.scene.thermodynamics import energy, solid_sound
 
 FAR = 30.0  # times beyond what is known
 EXPLOSIVES = 900.0, 2100.0  # kg/m3
