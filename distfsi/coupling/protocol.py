@@ -33,6 +33,7 @@ class Coupling(Protocol):
     sub_steps  how many sub-steps of the solid a step has at most
     stray      [m]: how far particles may go between two migrations, if there are sub-steps
     causes     of what the coupling creates or takes, keys of budget_by_cause()
+    at_ends    those of them that pass the ends of the domain with bodies: they have come in, or left
     kind       field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
                coupling/kernels/cells.py
     """
@@ -42,6 +43,7 @@ class Coupling(Protocol):
     sub_steps: int
     stray: float
     causes: tuple[str, ...]
+    at_ends: tuple[str, ...]
     kind: DualArray
 
     def time_step(self) -> float:

@@ -48,7 +48,8 @@ class Budget:
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
             self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
-            self.columns += [f"coupling {cause} {name}" for cause in coupling.causes for name in self.conserved]
+            self._created = [cause for cause in coupling.causes if cause not in coupling.at_ends]
+            self.columns += [f"coupling {cause} {name}" for cause in self._created for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
     def row(self, simulation) -> dict[str, float | int | str]:
@@ -90,14 +91,16 @@ class Budget:
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
+        made = self.coupling.budget_by_cause() if self.coupling else {}
+        left = left - sum(made[cause] for cause in (self.coupling.at_ends if self.coupling else ()))
         add("left", left)
         if self.coupling:
             step = simulation.last_step
             limit = step.name_particle(simulation.communicator) if step.sub_steps > 1 else ""
             values |= {"sub-steps": step.sub_steps, "sub-steps limited by": limit}
             values |= {f"trapped {n}": m for n, m in zip(self.conserved, self.coupling.trapped(), strict=False)}
-            for cause, amounts in self.coupling.budget_by_cause().items():
-                add(f"coupling {cause}", amounts, -1.0)
+            for cause in self._created:
+                add(f"coupling {cause}", made[cause], -1.0)
         if np.isnan(self._start).all():
             self._start = balance
         size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
@@ -119,7 +122,7 @@ class Budget:
         worst = max(abs(row[f"drift {name}"]) for name in self._names)
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(row[f"coupling {cause} {self.conserved[-1]}"] for cause in self.coupling.causes)
+            energy = sum(row[f"coupling {cause} {self.conserved[-1]}"] for cause in self._created)
             share = 100 * energy / self._scale[-1]
             text += f" The coupling created {energy:.4g} {self._joule} ({share:.2g} % of the energy)."
         return text

@@ -15,7 +15,8 @@ from matplotlib.figure import FigureBase
 from distfsi.output.frames import AXES, Frame
 from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
 from distfsi.output.progress import format_time
-from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
+from distfsi.output.quantities import UNITS
+from distfsi.output.scales import label_of, largest, norm_of, scaled
 
 COLORS = {"density": "bone_r", "schlieren": "gray_r"}  # others: OTHER_COLORS
 OTHER_COLORS, PARTICLE_COLORS = "viridis", "plasma"

@@ -14,7 +14,8 @@ from matplotlib.transforms import Bbox
 
 from distfsi.output.frames import Frame
 from distfsi.output.progress import format_time
-from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
+from distfsi.output.quantities import UNITS
+from distfsi.output.scales import label_of, largest, norm_of, scaled
 
 PROFILES = ("density", "pressure", "velocity", "volume_fraction", "plastic_strain")
 LOGARITHMIC = ("density", "pressure")  # where they span decades

@@ -60,13 +60,14 @@ class CutCells:
 
     reach   [m]: how far the solid's ghosts must go for its own sake: not at all
     sub_steps, stray  the most sub-steps of the solid in a step, and how far its particles may go in them [m]
-    causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
-            an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
-            them, and has not)
+    causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives); or of what passes
+            the ends of the domain with bodies: "ends" (the same while bodies touch an end, which gives the rest),
+            "sides" (what the fluid counts as having left beside them, and has not)
     geometry  of the last step; None before the first
     """
 
-    causes = ("wall", "sides")
+    causes = ("wall", "ends", "sides")
+    at_ends = ("ends", "sides")
     reach = 0.0
 
     def __init__(
@@ -81,7 +82,7 @@ class CutCells:
         self._initial = InitialState(present(scene.fluid), model, grid)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
-        self._wall_sums = np.zeros((blocks.local_count, model.conserved))
+        self._wall_sums, self._end_sums = np.zeros((2, blocks.local_count, model.conserved))
         self._build(scene)
         self.sub_steps = scene.coupling.sub_steps
         self._narrowest = float(min(grid.spacing[: grid.dimensions]))
@@ -157,7 +158,8 @@ class CutCells:
         rows = self._lone.rows()
         # cells
         motion = self._wall_particles.cut(passage, start, self._particles.carried)
-        lists, walls, expands = self._merge_cells(rows.shape[0] > 0)
+        touched = self._rows.largest(motion.image.reshape(-1), 0.0)
+        lists, walls, expands, at_end = self._merge_cells(rows.shape[0] > 0, touched > 0.0)
         merging, above = self._merging.merging_of(lists.band)
         # faces
         band, faces = self._fluxes.find_faces(lists.band, above, walls)
@@ -165,23 +167,24 @@ class CutCells:
         ends = self._merging.rows_in_band(self._sides.cells)
         start_volume = self.team.empty(lists.band.shape[0])
         self.geometry = CutGeometry(
-            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
+            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands, at_end
         )
         return self.geometry
 
-    def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
+    def _merge_cells(self, lone: bool, touched: bool) -> tuple[CellLists, Walls, bool, bool]:
         """Collective. Find merge targets, and let isolated cells hand their fluid to receivers; the lists of cells, and
-        whether any rank has `lone` particles whose cells expand."""
+        whether any rank has `lone` particles whose cells expand, and whether on any an end of the domain is `touched`
+        by bodies."""
         walls = self._walls
         self._merging.find_targets(walls, self.fluid_volume.device)
         lists = self._merging.list_cells(walls, self.fluid_volume.device)
         states = self._redistribution.states(self.fluid.device_state)
         self._redistribution.take_contents(lists.band, states)
-        found = np.array([float(self._redistribution.any_absorbed(lists.band, walls.kind)), float(lone)])
-        absorbed, alone = self.blocks.communicator.maximum(found)
+        found = (self._redistribution.any_absorbed(lists.band, walls.kind), lone, touched)
+        absorbed, alone, at_end = self.blocks.communicator.maximum(np.array(found, dtype=float))
         if absorbed > 0.0:
             lists = self.absorb(lists, walls)
-        return lists, walls, bool(alone > 0.0) and not self._staircase
+        return lists, walls, bool(alone > 0.0) and not self._staircase, bool(at_end > 0.0)
 
     def absorb(self, lists: CellLists, walls: Walls) -> CellLists:
         """Collective. Contents of isolated cells move to their receivers, and these cells are covered: the new
@@ -242,8 +245,9 @@ class CutCells:
         D, P, p = self._dimensions, self.model.phases, self._particles
         states = self._redistribution.states(self.fluid.device_state)
         impulse, work = self._forces.correct(geometry, excess, transfer.shared, states)
-        self._wall_sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
-        self._wall_sums[:, -1] += p.work - work - transfer.dragged[:, -1]
+        sums = self._end_sums if geometry.at_end else self._wall_sums
+        sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
+        sums[:, -1] += p.work - work - transfer.dragged[:, -1]
 
     # ---- between steps ----------------------------------------------------------------------------------------------
 
@@ -320,7 +324,7 @@ class CutCells:
         """What a restart needs: the volumes, and the budget."""
         return {
             "cells": {"fluid_volume": self.blocks.without_ghosts(self.fluid_volume.host()[:, :1])},
-            "sums": {"wall": self._wall_sums, "sides": self._sides.passed.host()},
+            "sums": {"wall": self._wall_sums, "ends": self._end_sums, "sides": self._sides.passed.host()},
             "values": {"drift": np.array(self._wall_particles.thin.drift)},
         }
 
@@ -331,7 +335,7 @@ class CutCells:
         self._classify()
         self._fill_volume_ghosts()
         self._wall_particles.thin.drift = float(snapshot["values"]["drift"])
-        self._wall_sums[:] = snapshot["sums"]["wall"]
+        self._wall_sums[:], self._end_sums[:] = (snapshot["sums"][name] for name in ("wall", "ends"))
         self._sides.restore(snapshot["sums"]["sides"])
         self.wall.near.host()[:] = 1
         self.wall.near.changed()
@@ -339,6 +343,6 @@ class CutCells:
         self._wall_particles.cut(self._wall_particles.find(position), position, self._particles.velocity)
 
     def budget_by_cause(self) -> dict[str, np.ndarray]:
-        """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
-        totals = self.blocks.sum(np.hstack([self._wall_sums, self._sides.sums()]))
+        """Collective. Masses, momentum and energy (conserved,) that there are more since the start, per cause."""
+        totals = self.blocks.sum(np.hstack([self._wall_sums, self._end_sums, self._sides.sums()]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

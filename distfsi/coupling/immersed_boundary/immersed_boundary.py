@@ -96,6 +96,7 @@ class ImmersedBoundary:
     """
 
     causes = ("wall", "covered", "fresh", "sides")
+    at_ends = ("sides",)
     sub_steps, stray = 1, 0.0
 
     def __init__(
