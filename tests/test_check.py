@@ -204,6 +204,31 @@ def test_a_partial_bench_is_printed_but_not_kept(kept, capsys):
     assert bench.kept_bench() is None
 
 
+def test_a_bench_that_was_interrupted_goes_on(kept, monkeypatch, capsys):
+    """Each measurement is told on standard error and kept at once."""
+    for name in ("SMALLEST", "SIZES", "SOLIDS", "COUPLED"):
+        monkeypatch.setattr(bench, name, {})
+    measured = []
+
+    def fake(work, *_):
+        if work == 3 and len(measured) == 2:
+            raise KeyboardInterrupt
+        measured.append(work)
+        return {"speed": float(work)}
+
+    monkeypatch.setattr(bench, "FLUIDS", {f"flow {n}": lambda n=n: n for n in (1, 2, 3)})
+    monkeypatch.setattr(bench, "bench_fluid", fake)
+    with pytest.raises(KeyboardInterrupt):
+        bench.main(Communicator(), 1)
+    assert "2 of 3: flow 2" in capsys.readouterr().err
+    assert bench.kept_bench() is None
+    monkeypatch.setattr(bench, "bench_fluid", lambda work, *_: {"speed": 10.0 * work})
+    result = bench.main(Communicator(), 1)
+    assert [result[f"flow {n}"]["speed"] for n in (1, 2, 3)] == [1.0, 2.0, 30.0]
+    assert bench.kept_bench() == result
+    assert bench.main(Communicator(), 1)["flow 1"]["speed"] == 10.0  # a complete one begins anew
+
+
 FIXED = {"start_seconds": 1.0, "seconds_per_step": 9e-4, "history_row_seconds": 1e-3}
 RATES = {
     "ranks": 1,

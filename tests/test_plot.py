@@ -143,7 +143,7 @@ def test_a_movie_holds_all_frames(space, line):
 
 def test_gauges(space, figures):
     paths = [path.name for path in plot(space, gauges=True)]
-    assert paths == ["gauge-body.png", "gauge-line.png", "gauge-point.png", "pressure-000000.png"]
+    assert paths == ["gauge-body.png", "gauge-line.png", "gauge-point.png", "gauge-cut.png"]
     for figure in figures[:3]:
         assert_tidy(figure)
     assert len(figures[1].axes[0].lines) == 4  # times of the line

@@ -97,6 +97,22 @@ class LayerFiles:
         self.number += 1
 
 
+class LayerAndTable(LayerFiles):
+    """Samples of a probe as field files in the folder PATH, and rows of PATH.csv."""
+
+    def __init__(self, path: Path, probe: LayerProbe, communicator: Communicator, files: Storage):
+        super().__init__(path, probe, communicator, files)
+        self._table = TableFile(path, present(probe.table), communicator)
+
+    def open(self, until: float | None = None) -> None:
+        super().open(until)
+        self._table.open(until)
+
+    def write(self, run: SampledRun, time: float) -> None:
+        super().write(run, time)
+        self._table.write(run, time)
+
+
 class GaugeRecorder:
     """Samples a run at the first step at or after each multiple of its interval; the samples are in files at once."""
 
@@ -110,12 +126,14 @@ class GaugeRecorder:
             self._files: TableFile | LayerFiles = TableFile(path, self._probe, communicator)
         elif isinstance(self._probe, LayerProbe):
             files = storage(simulation.scene.output.hdf5, communicator)
-            self._files = LayerFiles(path, self._probe, communicator, files)
+            kind = LayerAndTable if self._probe.table else LayerFiles
+            self._files = kind(path, self._probe, communicator, files)
         interval = gauge.interval(simulation.scene.time.end)
         self._each_step, self._schedule, self._last = interval == 0.0, Every(interval), 0.0
 
     def after_step(self, simulation: Any) -> None:
         """Collective. Sample the state after a step, or the one at the start, if it is time."""
+        self._probe.see(self._run)
         if self._each_step or self._schedule.due(simulation.time):
             self._last = simulation.time
             self._files.write(self._run, simulation.time)

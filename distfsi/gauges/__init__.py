@@ -159,6 +159,9 @@ class Run(Protocol):
 class Probe:
     """Samples a run for one gauge."""
 
+    def see(self, run: Run) -> None:
+        """Collective. Look at the state after each step, and at that at the start, before it may be sampled."""
+
     def kept(self) -> Kept:
         """What a restart needs of it, by name."""
         return {}
@@ -190,6 +193,7 @@ class LayerProbe(Probe):
     """Samples are fields of some cells: those of a `layer`."""
 
     layer: Layer
+    table: TableProbe | None = None  # of what goes into a table besides
 
     def fields(self, run: Run) -> dict[str, np.ndarray]:
         """Collective. The fields of the layer's blocks now."""

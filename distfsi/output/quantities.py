@@ -12,6 +12,8 @@ UNITS = {
     "energy": "J/kg",
     "von_mises": "Pa",
     "stress": "Pa",
+    "overpressure": "Pa",
+    "impulse": "Pa s",
     "peak_overpressure": "Pa",
     "peak_dynamic_pressure": "Pa",
     "positive_impulse": "Pa s",
