@@ -427,7 +427,8 @@ def wall(tmp_path_factory):
         "domain.lower=[0, 0]", "domain.upper=[1, 0.05]", "domain.cells=[100, 5]", "performance.block_cells=[32, 4]",
         "domain.x=['outflow', 'wall']", "domain.y=['wall', 'wall']", f'output.directory="{directory}"',
         "fluid.regions.1.shape={kind='box', lower=[0.5, -1], upper=[2, 1]}", "time.end=0.35",
-        "gauges.face={kind='surface', side='x_high', every=0.1}", "gauges.point={kind='point', position=[0.995, 0.025]}",
+        "gauges.face={kind='surface', side='x_high', every=0.1}",
+        "gauges.point={kind='point', position=[0.995, 0.025]}",
     ]  # fmt: skip
     run(load(SOD, words), Communicator(), threads=1)
     return directory

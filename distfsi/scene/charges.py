@@ -20,8 +20,8 @@ MOST_CELLS = 2_000_000  # around a charge: of more it is taken for granted that 
 ENOUGH = 8  # cells per radius
 POINTS = 12  # per axis, at which the distance between a charge and a body is looked for
 
-# What a coarse charge costs: cells per radius, and the parts of peak overpressure and of impulse that are missing, in
-# 3D, the means from 3 to 6 radii away (docs/validation.md).
+# What a coarse charge costs: cells per radius; the part of the peak overpressure that is missing; the part by which the
+# impulse is off, too high near the charge. TNT in air in 3D, means over 3 to 5 radii, beside the limit of fine cells.
 LOSSES = ((1, 0.0, 0.0), (2, 0.0, 0.0), (3, 0.0, 0.0), (5, 0.0, 0.0), (8, 0.0, 0.0), (12, 0.0, 0.0))
 
 
@@ -81,7 +81,8 @@ def charges(scene: Scene) -> list[Charge]:
 
 
 def losses(cells: float) -> tuple[float, float]:
-    """Parts of peak overpressure and impulse that so many cells per radius cost, between those that were measured."""
+    """Part of the peak overpressure that is missing, and by which the impulse is off, with so many cells per radius:
+    between those that were measured."""
     known = np.array(LOSSES)
     at = np.log(np.clip(cells, known[0, 0], known[-1, 0]))
     peak, impulse = (float(np.interp(at, np.log(known[:, 0]), column)) for column in known[:, 1:].T)

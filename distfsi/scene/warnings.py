@@ -25,8 +25,9 @@ def _charge(charge: Charge, bodies: tuple[Body, ...], domain: Domain) -> Iterato
     if charge.cells < ENOUGH:
         peak, impulse = losses(charge.cells)
         yield (
-            f"{charge.cells:.2g} cells per radius, which costs about {100.0 * peak:.0f} % of the peak overpressure and "
-            f"{100.0 * impulse:.0f} % of the impulse; {ENOUGH} are better"
+            f"{charge.cells:.2g} cells per radius: a few radii away {'more than' * (charge.cells < 1.0) or 'about'} "
+            f"{100.0 * peak:.0f} % of the peak overpressure are missing, and the impulse is {100.0 * impulse:.0f} % off; "
+            f"{ENOUGH} are better"
         )
     if abs(charge.placed - charge.meant) > MISPLACED * charge.meant:
         per = per_extent("kg", domain.dimensions)
