@@ -24,11 +24,9 @@ def warnings(scene: Scene) -> Iterator[str]:
 def _charge(charge: Charge, bodies: tuple[Body, ...], domain: Domain) -> Iterator[str]:
     if charge.cells < ENOUGH:
         peak, impulse = losses(charge.cells)
-        yield (
-            f"{charge.cells:.2g} cells per radius: a few radii away {'more than' * (charge.cells < 1.0) or 'about'} "
-            f"{100.0 * peak:.0f} % of the peak overpressure are missing, and the impulse is {100.0 * impulse:.0f} % off; "
-            f"{ENOUGH} are better"
-        )
+        about = "more than" if charge.cells < 1.0 else "about"
+        cost = f"{about} {100.0 * peak:.0f} % of the peak overpressure and puts the impulse {100.0 * impulse:.0f} % off"
+        yield f"{charge.cells:.2g} cells per radius, which a few radii away costs {cost}; {ENOUGH} are better"
     if abs(charge.placed - charge.meant) > MISPLACED * charge.meant:
         per = per_extent("kg", domain.dimensions)
         yield f"its cells hold {charge.placed:.4g} of the {charge.meant:.4g} {per} that are meant: the rest is hidden"
