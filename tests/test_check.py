@@ -38,8 +38,10 @@ def advised(scene):
 
 
 ADVICE = {  # on purpose
-    "cavitation": "phase 'air' fills no cell",  # only traces of it, from which the bubbles grow
-    "thin_plate": "thinner than sqrt(2) cells",
+    "cavitation": ("phase 'air' fills no cell",),  # only traces of it, from which the bubbles grow
+    "thin_plate": ("thinner than sqrt(2) cells",),
+    "concrete_slab": ("2.7 cells per radius",),
+    "steel_tube_full": ("the rest is hidden", "into body 'tube'"),  # the charge leans against the tube
 }
 
 
@@ -48,8 +50,8 @@ def test_every_example_gets_a_report_without_advice(path):
     scene = load(path)
     text = report(scene)
     assert text.startswith(scene.title)
-    known = ADVICE.get(path.stem, "")
-    assert [text for text in advised(scene) if not known or known not in text] == []
+    known = ADVICE.get(path.stem, ())
+    assert [text for text in advised(scene) if not any(words in text for words in known)] == []
     for name in ("domain", "blocks", "memory", "output", "steps", "time"):
         assert f"\n  {name} " in text
     assert "distfsi bench" in text

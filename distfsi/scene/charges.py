@@ -16,7 +16,7 @@ from distfsi.scene.shapes import bounding_box, distance, smallest_extent, volume
 from distfsi.scene.thermodynamics import energy
 
 TNT = 4.184e6  # J/kg of the TNT that explosives are compared with
-MOST_CELLS = 2_000_000  # around a charge: of more it is taken for granted that they hold what is meant
+CELL_LIMIT = 2_000_000  # around a charge: of more it is taken for granted that they hold what is meant
 ENOUGH = 8  # cells per radius
 POINTS = 12  # per axis, at which the distance between a charge and a body is looked for
 
@@ -97,7 +97,7 @@ def _volumes(scene: Scene, number: int, shape: Shape) -> tuple[float, float]:
     count = math.prod(map(len, centers))
     if count == 0:
         return 0.0, exact or 0.0
-    if count > MOST_CELLS and exact is not None:
+    if count > CELL_LIMIT and exact is not None:
         return exact, exact
     sampled = cell_fractions(shape, centers, domain.spacing)
     part = corrected(sampled, Filled.by(sampled), None if exact is None else exact / cell)

@@ -19,7 +19,7 @@ from distfsi.scene.overrides import TABLES, apply
 from distfsi.scene.schema import Input, Sections, context_of
 
 LARGEST_FILE = 64_000_000  # bytes of an input
-MOST_FAULTS = 100  # that are told at once
+FAULT_LIMIT = 100  # that are told at once
 LONGEST_NAME = 100  # letters of a phase, a body, a gauge, a source
 
 
@@ -71,19 +71,19 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
 
 
 def validate(data: dict[str, Any]) -> tuple[Sections, list[Fault]]:
-    """The sections of `data` that are valid in themselves, and the faults of the others, but not more than MOST_FAULTS
+    """The sections of `data` that are valid in themselves, and the faults of the others, but not more than FAULT_LIMIT
     of them."""
     context = context_of(data)
     if unreadable := list(find_unreadable(data)):
-        return Sections(), unreadable[:MOST_FAULTS]
+        return Sections(), unreadable[:FAULT_LIMIT]
     try:
         return Input.model_validate(data, context=context), []
     except ValidationError as error:
         errors = error.errors(include_url=False)
     sound = {key: value for key, value in data.items() if key not in {error["loc"][0] for error in errors}}
-    faults = diagnose(errors[:MOST_FAULTS], data, schema())
-    if len(errors) > MOST_FAULTS:
-        faults.append(Fault((), f"and {len(errors) - MOST_FAULTS} more faults"))
+    faults = diagnose(errors[:FAULT_LIMIT], data, schema())
+    if len(errors) > FAULT_LIMIT:
+        faults.append(Fault((), f"and {len(errors) - FAULT_LIMIT} more faults"))
     return Sections.model_validate(sound, context=context), faults
 
 
