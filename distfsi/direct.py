@@ -20,9 +20,19 @@ from distfsi.mesh.communicator import Communicator
 VALUES = 2**17  # of a message that is tried: 1 MiB
 PATIENCE = 120.0  # seconds for a message within a process that starts
 LAUNCHERS = (  # how names begin that tell a process that it is a rank
-    "PMI", "HYDRA", "MPI_LOCAL", "MPIEXEC", "OMPI_COMM", "OMPI_UNIVERSE", "OMPI_MCA_ess", "OMPI_MCA_orte", "ORTE",
-    "PRTE", "SLURM", "PALS",
-)  # fmt: skip
+    "PMI",
+    "HYDRA",
+    "MPI_LOCAL",
+    "MPIEXEC",
+    "OMPI_COMM",
+    "OMPI_UNIVERSE",
+    "OMPI_MCA_ess",
+    "OMPI_MCA_orte",
+    "ORTE",
+    "PRTE",
+    "SLURM",
+    "PALS",
+)
 
 
 def refusal(communicator: Communicator) -> str:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.cuda import NoGpu, gpu_of
+from distfsi.device.gpu import Gpu
 from distfsi.device.interface import Device
 from distfsi.device.native import compilation
 from distfsi.device.nvrtc import CompileError
@@ -21,11 +24,12 @@ from distfsi.direct import arrives, refusal
 from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.balance import Balance, Handover
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.journal import Journal, set_aside
 from distfsi.output.progress import Progress
 from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
-from distfsi.output.restart import find_restart
+from distfsi.output.restart import Restart, find_restart
 from distfsi.output.storage import on_root, prepare_directory, storage
 from distfsi.scene.description import Scene
 from distfsi.scene.warnings import warnings
@@ -41,7 +45,8 @@ def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
 
     `direct`: messages are to lie in the GPU's memory.
     """
-    gpu, faults = None, []
+    gpu: Gpu | None = None
+    faults: list[str] = []
     try:
         gpu = gpu_of(communicator.local_rank, direct)
     except (NoGpu, CompileError) as error:
@@ -50,9 +55,9 @@ def gpu_of_rank(communicator: Communicator, direct: bool = False) -> Device:
     if direct:
         why = refusal(communicator)
         _refuse([f"--gpu-aware-mpi: {why}"] if why else [], communicator)
-        if not arrives(communicator, gpu):
+        if not arrives(communicator, present(gpu)):
             raise InputError(["--gpu-aware-mpi: messages between ranks arrive otherwise than they were sent"])
-    return gpu
+    return present(gpu)
 
 
 def _refuse(faults: list[str], communicator: Communicator) -> None:
@@ -91,9 +96,9 @@ def run(
     """
     started = clock.perf_counter()
     directory, output = Path(scene.output.directory), scene.output
-    requests = Requests(output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
+    requests = Requests(Path(output.stop_file), scene.time.wall_clock_limit, output.restart_every, communicator)
     files = storage(output.hdf5, communicator)
-    origin = find_restart(restart, directory, scene, communicator)
+    origin: Restart | Handover | None = find_restart(restart, directory, scene, communicator)
     prepare_directory(directory, communicator)
     if restart is None:
         set_aside(directory, communicator)
@@ -101,12 +106,14 @@ def run(
         for text in warnings(scene):
             print(f"warning: {text}", flush=True)
     progress = Progress(scene.time.end, communicator)
+    for note in scene.notes:
+        progress.say(note)
     threads = threads or threads_of_rank(communicator)
-    device = gpu_of_rank(communicator, direct) if on_gpu else Team(threads)
+    device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None
     performance = Performance(parts_of(scene), timers, communicator)
     journal = Journal(directory, scene, communicator, threads, performance.sums)
-    with requests, closing(progress), threadpool_limits(1), journal, compilation.told(progress.compiling):
+    with requests, closing(progress), threadpool_limits(1), journal, compilation.announced(progress.compiling):
         while True:
             simulation = Simulation.of(scene, communicator, threads, costs, device)
             simulation.requested, simulation.timers = requests.strongest, timers
@@ -139,7 +146,7 @@ def run(
 
 
 def advance(
-    simulation: Simulation, records: Records, kept: dict, requests: Requests, progress: Progress
+    simulation: Simulation, records: Records, kept: Mapping[str, Any], requests: Requests, progress: Progress
 ) -> np.ndarray | None:
     """The loop over time: step, write what is due, do what was asked for. Raises Diverged and Stopped.
 

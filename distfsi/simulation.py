@@ -13,7 +13,7 @@ import psutil
 from distfsi.coupling.cut_cells.cut_cells import CutCells
 from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
 from distfsi.coupling.protocol import Coupling, ReleasesFluid
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
 from distfsi.diagnostics.derived import DerivedFields
@@ -25,13 +25,18 @@ from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
 from distfsi.mesh.communicator import Communicator
+from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
-COUPLINGS = {"cut_cells": CutCells, "stairs": CutCells, "paper": ImmersedBoundary}
+COUPLINGS: dict[str, Callable[..., Coupling]] = {
+    "cut_cells": CutCells,
+    "staircase": CutCells,
+    "immersed_boundary": ImmersedBoundary,
+}
 COST_OF_PARTICLE = 30.0  # in cells, for the first deal of blocks to ranks
 
 NOT_REDONE = "; a step of fluid and solid together is not redone with a smaller time step: try a smaller time.cfl"
@@ -45,11 +50,11 @@ class Simulation:
     watchers  what looks at the state at the start and after every step: it has a `name`, `after_step(simulation)`,
               `snapshot()` and `restore(snapshot)`
     derived   fields of the cells for the output files, beside those of the fluid
-    last_step   the step made last
-    limited_by  what set it, as far as is known without asking other ranks: with the cell or particle named last
-    loaded, alone  whether the fluid has pressed on the solid by more than the scene's limit; by less since, so that it
-              was dropped, and the solid goes on alone
-    requested     what this rank is asked for; looked at once in every step
+    last_step the step made last
+    named     what set steps, with the cell or particle, as it was named last
+    loaded    whether the fluid has pressed on the solid by more than the scene's limit
+    alone     whether by less since, so that it was dropped, and the solid goes on alone
+    requested  what this rank is asked for; looked at once in every step
     """
 
     scene: Scene
@@ -64,7 +69,7 @@ class Simulation:
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
-    limited_by: str = str(Reason.START)
+    named: dict[Reason, str] = field(default_factory=dict)
     loaded: bool = False
     alone: bool = False
     requested: Callable[[], Request] = lambda: Request.NOTHING
@@ -83,18 +88,20 @@ class Simulation:
         `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
         """
         blocks = deal_blocks(scene, communicator, costs)
-        device = device or Team(threads or threads_of_rank(communicator))
+        device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if scene.fluid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if model else None
         solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
-        coupled = COUPLINGS[scene.coupling.scheme]
-        coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock()) if fluid and solid else None
+        coupling: Coupling | None = None
+        if model and fluid and solid:
+            coupled = COUPLINGS[scene.coupling.scheme]
+            coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
-        if scene.output.peaks:
+        if scene.output.peaks and fluid:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)
             simulation.derived.append(peaks)
-        if scene.output.schlieren:
+        if scene.output.schlieren and fluid:
             simulation.derived.append(Schlieren(fluid))
         simulation.watchers += [GaugeRecorder(name, gauge, simulation) for name, gauge in scene.gauges.items()]
         return simulation
@@ -111,14 +118,14 @@ class Simulation:
         except Diverged as error:
             faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
             if isinstance(error, StepFailed):
-                self.fluid.reject()
+                present(self.fluid).reject()
                 raise Diverged(f"{faults[0]}; {error}") from error
             raise Diverged(faults[0] + (NOT_REDONE if self.coupling else "")) from error
-        if made.reason is not self.last_step.reason:
-            self.limited_by = str(made.reason)
         self.last_step = made
         self.time += made.dt
         self.steps += 1
+        if made.reason not in self.named:
+            self.name_limit()
         self.watch()
         minimum = self.scene.coupling.drop_below
         if minimum is not None and not self.alone and isinstance(self.coupling, ReleasesFluid):
@@ -132,9 +139,10 @@ class Simulation:
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
+        fluid, solid, coupling = self._active
         given = (self.time, self.scene.time, self.requested(), self.communicator, self.timers)
         with self.timers("time step"):
-            return time_step(*self._active, *given)
+            return time_step(fluid, solid, coupling, *given)
 
     @property
     def dt(self) -> float:
@@ -153,7 +161,7 @@ class Simulation:
         if self.loaded and pressure < minimum:
             self.alone = True
             coupling.let_fluid_leave()
-            self.solid.given[:] = 0.0
+            present(self.solid).given[:] = 0.0
 
     def watch(self) -> None:
         """Show the state to the watchers: once before the first step, then after each."""
@@ -162,10 +170,16 @@ class Simulation:
                 watcher.after_step(self)
 
     def name_limit(self) -> str:
-        """Collective. What set the last time step; if the fluid did, where it was fastest and how fast. Progress tells
-        it until the next step that is limited otherwise, or asked for."""
-        self.limited_by = self.last_step.name_reason(self.fluid, self.communicator)
-        return self.limited_by
+        """Collective. What set the last time step; if the fluid did, where it was fastest and how fast; if the solid
+        did, which particle and why."""
+        step = self.last_step
+        self.named[step.reason] = step.name_reason(self.fluid, self.communicator)
+        return self.named[step.reason]
+
+    @property
+    def limited_by(self) -> str:
+        """What set the last time step, with the cell or particle that was named last, when it or one like it was."""
+        return self.named.get(self.last_step.reason, str(self.last_step.reason))
 
     def check(self) -> None:
         """Collective. Raise Diverged on all ranks when the next step cannot start from the present state."""
@@ -211,12 +225,12 @@ class Simulation:
         limit = self.scene.time.maximum_steps
         return self.time >= self.scene.time.end or (limit is not None and self.steps >= limit)
 
-    def outputs(self) -> tuple[dict | None, dict | None]:
+    def outputs(self) -> tuple[dict[str, np.ndarray] | None, dict[str, np.ndarray] | None]:
         """Collective. Fields of cells and particles for the output files."""
         covered = self.coupling.covered if self.coupling else None
         cells = self.fluid.outputs(covered) if self.fluid else None
         for derived in self.derived:
-            cells |= derived.outputs(covered)
+            cells = present(cells) | derived.outputs(covered)
         if self.solid is None:
             return cells, None
         self.solid.label_pieces()

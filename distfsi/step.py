@@ -16,7 +16,8 @@ from distfsi.coupling.cut_cells.cut_cells import FARTHEST_MOVE, LARGEST_MOVE
 from distfsi.coupling.protocol import Coupling
 from distfsi.device.timers import Timers
 from distfsi.errors import Diverged, StepFailed
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.requests import Request
@@ -80,15 +81,20 @@ class TimeStep:
 def parts_of(scene: Scene) -> tuple[str, ...]:
     """The parts that the steps of a scene have."""
     fluid, solid = scene.fluid is not None, scene.solid is not None
-    return (
-        "time step", *FLUID_PARTS * fluid, *COUPLING_PARTS * (fluid and solid), *SOLID_PARTS * solid, "output",
-    )  # fmt: skip
+    between = FLUID_PARTS * fluid + COUPLING_PARTS * (fluid and solid) + SOLID_PARTS * solid
+    return ("time step", *between, "output")
 
 
 def time_step(
-    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, time: float, limits: Time,
-    request: Request, communicator: Communicator, timers: Timers,
-) -> TimeStep:  # fmt: skip
+    fluid: Fluid | None,
+    solid: Structure | None,
+    coupling: Coupling | None,
+    time: float,
+    limits: Time,
+    request: Request,
+    communicator: Communicator,
+    timers: Timers,
+) -> TimeStep:
     """Collective, after find_forces(). The longest stable step of all parts on all ranks from `time` [s] on, within the
     `limits` of the scene.
 

@@ -103,9 +103,13 @@ CASES: Mapping[str, Case] = {
     "sedov rusanov": Case("sedov", settings=("fluid.riemann=rusanov", "output.schlieren=true", "output.peaks=true")),
     "tnt_air weno5": Case("tnt_air", settings=("fluid.reconstruction=weno5", "fluid.sharpening=true")),
     "water_air five_equation": Case("water_air", settings=("fluid.model=five_equation",)),
-    "gas_piston paper": Case("gas_piston", settings=("coupling.scheme=paper", "coupling.sub_steps=1")),
-    "thin_plate stairs": Case("thin_plate", settings=("coupling.scheme=stairs",)),
-    "steel_tube paper": Case("steel_tube", settings=(*COARSE_TUBE, "coupling.scheme=paper", "coupling.sub_steps=1")),
+    "gas_piston immersed_boundary": Case(
+        "gas_piston", settings=("coupling.scheme=immersed_boundary", "coupling.sub_steps=1")
+    ),
+    "thin_plate staircase": Case("thin_plate", settings=("coupling.scheme=staircase",)),
+    "steel_tube immersed_boundary": Case(
+        "steel_tube", settings=(*COARSE_TUBE, "coupling.scheme=immersed_boundary", "coupling.sub_steps=1")
+    ),
     "steel_tube gauges": Case("steel_tube", settings=(*COARSE_TUBE, *GAUGES, "solid.objective_rate=green_naghdi")),
     "steel_tube dropped": Case("steel_tube", 110, (*COARSE_TUBE, "coupling.drop_below=1 GPa")),
     "burst_tube debris": Case("burst_tube", 120, BRITTLE),

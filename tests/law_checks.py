@@ -70,8 +70,12 @@ def _check_waves(law, material, rho, p):
     for p_end in (0.5 * p, 2.0 * p):
         path = solve_ivp(
             lambda p, y: [1.0 / thermodynamics.sound_speed_squared(law, y[0], p)],
-            (p, p_end), [rho], "DOP853", rtol=1e-12, atol=1e-12 * rho,
-        )  # fmt: skip
+            (p, p_end),
+            [rho],
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-12 * rho,
+        )
         assert path.y[0, -1] == pytest.approx(material.isentrope(rho, p, p_end)[1, -1], rel=1e-10)
     for factor in (1.1, 3.0):
         behind = material.behind_shock(rho, p, factor * p)

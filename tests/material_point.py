@@ -27,7 +27,7 @@ class Points:
         bodies = tuple(replace(each, name=f"body {b}") for b, each in enumerate(bodies))
         materials = Materials(d.Solid(bodies, 1.3, 1.0, 2.0, rate), D)
         constants = {"DIMENSIONS": D, "COMPONENTS": D * (D + 1) // 2} | materials.constants
-        body, self.count, self.device = np.asarray(body), len(body), device or cpu.Team(1)
+        body, self.count, self.device = np.asarray(body), len(body), device or cpu.Cpu(1)
         size = np.array([each.spacing for each in bodies])[body]
         columns = materials.initial(body, np.arange(self.count), size**D) | {"body": body, "h": 1.3 * size}
         columns |= {"energy": np.zeros(self.count), "density": np.array([each.density for each in bodies])[body]}

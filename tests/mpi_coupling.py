@@ -17,7 +17,7 @@ from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
 from distfsi.simulation import Simulation
 
-SCHEMES = ("paper", "cut_cells")
+SCHEMES = ("immersed_boundary", "cut_cells")
 AIR = (d.Phase("air", IdealGas(1.4)),)
 AIR_AND_WATER = (*AIR, d.Phase("water", StiffenedGas(4.4, 60.0)))
 
@@ -55,9 +55,23 @@ class Coupled:
     """Fluid, solid and coupling of a scene, and the step that joins them."""
 
     def __init__(
-        self, bodies, regions, lower, upper, cells, kinds=None, block=8, threads=1, phases=AIR, precision="float64",
-        scheme="paper", cfl=0.4, runge_kutta="rk3", form="updated_lagrangian", drop_below=None,
-    ):  # fmt: skip
+        self,
+        bodies,
+        regions,
+        lower,
+        upper,
+        cells,
+        kinds=None,
+        block=8,
+        threads=1,
+        phases=AIR,
+        precision="float64",
+        scheme="immersed_boundary",
+        cfl=0.4,
+        runge_kutta="rk3",
+        form="updated_lagrangian",
+        drop_below=None,
+    ):
         D = len(lower)
         kinds = kinds or (("wall", "wall"),) * D
         regions = tuple(d.Region(state, shape) for state, shape in regions)
@@ -137,7 +151,7 @@ def flying_discs(threads, block, scheme):
 
 def sinking_plate(threads, block, scheme):
     """A plate with both phases around it in three dimensions, a quarter of it; lighter than both with cut cells."""
-    density = 3.0 if scheme == "paper" else 0.1
+    density = 3.0 if scheme == "immersed_boundary" else 0.1
     plate = body(d.Box((0.3, 0.0, 0.0), (0.5, 0.25, 0.3)), 0.05, density, (1.5, 0, 0))
     regions = [(gas(1.0, 1.0, (0, 0, 0)), None), (gas(5.0, 4.0, (0, 0, 0), 1), d.Box((0.6, 0.0, 0.0), (1.0, 1.0, 1.0)))]
     kinds = (("wall", "outflow"), ("symmetry", "wall"), ("symmetry", "outflow"))
@@ -194,7 +208,7 @@ def main():
             made = {cause: np.abs(amounts[-1]) for cause, amounts in created.items()}
             if case is stretched_plate:  # it reaches through the ends of the domain, and pushes against them
                 assert all(np.isfinite(amount) for amount in made.values())
-            elif scheme == "paper":
+            elif scheme == "immersed_boundary":
                 assert all(made[cause] > 0.0 for cause in ("wall", "covered", "fresh"))
             else:
                 assert made["wall"] < 1e-12 * scale

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from distfsi.device import cuda
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostRuntime
 from distfsi.errors import Diverged
@@ -171,7 +171,7 @@ def faults_of(communicator):
 def check_scenes():
     """Every scene."""
     for name in SCENES:
-        expected = result(name, Team(1))
+        expected = result(name, Cpu(1))
         for late, direct in WAYS:
             assert same(result(name, Gpu(HostRuntime(late), direct)), expected), (name, late, direct)
         print(f"{name}: same bits")
@@ -180,7 +180,7 @@ def check_scenes():
 def check_solids():
     """Collisions and a ball that bursts."""
     for case, (steps, ways) in SOLIDS.items():
-        expected = solid_result(case, steps, Team(1))
+        expected = solid_result(case, steps, Cpu(1))
         for way in ways:
             late, direct = way
             assert same(solid_result(case, steps, Gpu(HostRuntime(late), direct)), expected), (case.__name__, way)
@@ -189,8 +189,8 @@ def check_solids():
 
 def check_coupled():
     """A coupled scene with peaks, as late as the order allows, with messages of the device."""
-    for case in (("cut_cells", 50), ("paper", 20)):
-        assert same(coupled_result(Gpu(HostRuntime(), True), *case), coupled_result(Team(1), *case)), case
+    for case in (("cut_cells", 50), ("immersed_boundary", 20)):
+        assert same(coupled_result(Gpu(HostRuntime(), True), *case), coupled_result(Cpu(1), *case)), case
         print(f"coupled by {case[0]}: same bits")
 
 
@@ -202,11 +202,11 @@ def check_gpu():
     """Every scene on the GPUs of this node."""
     gpu, name_of_gpu = partial(cuda.gpu_of, Communicator().local_rank), cuda.gpu_name(0)
     for name in SCENES:
-        assert same(result(name, gpu()), result(name, Team(1))), name
+        assert same(result(name, gpu()), result(name, Cpu(1))), name
         print(f"{name}: same bits on {name_of_gpu}")
     others = [partial(solid_result, case, steps) for case, (steps, _) in SOLIDS.items()] + [coupled_result]
     for other in others:
-        assert close(other(gpu()), other(Team(1)))
+        assert close(other(gpu()), other(Cpu(1)))
         print(f"solid: close on {name_of_gpu}")
 
 
@@ -221,7 +221,7 @@ def check_mutants():
     """Without one of the waits, copies and orders something comes out otherwise, or a message goes too early."""
     cases = (("", partial(result, "bubble"), MUTANTS), ("particles ", partial(solid_result, *MOVES), SOLID_MUTANTS))
     for what, case, mutants in cases:
-        expected = case(Team(1))
+        expected = case(Cpu(1))
         for (name, take_away), direct in product(mutants.items(), (False, True)):
             if not (direct and "copy" in name):
                 assert is_found(case, expected, take_away, direct), (what, name, direct)
@@ -242,7 +242,7 @@ def is_found(case, expected, take_away, direct):
 def check_fatal():
     """Without the order before packing rows are packed that are not there yet; what comes of that may kill."""
     case = partial(solid_result, *MOVES)
-    expected = case(Team(1))
+    expected = case(Cpu(1))
     assert same(case(Gpu(HostRuntime())), expected)
     print("begun", flush=True)
     assert not is_found(case, expected, without_order(Queue.ASYNCHRONOUS), False)

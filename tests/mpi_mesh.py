@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.interface import Columns
 from distfsi.errors import Diverged
 from distfsi.mesh.blocks import Blocks, Grid
@@ -74,7 +74,7 @@ def check_ghost_cells(communicator, copy, grid, block_cells, dtype=np.float64):
         expected[b, :, : nz + 2 * z, : ny + 2 * y, : nx + 2 * x] = box
         active = (b, slice(None), slice(z, z + nz), slice(y, y + ny), slice(x, x + nx))
         field[active] = expected[active]
-    exchange = GhostExchange(blocks, Team(1), copy)
+    exchange = GhostExchange(blocks, Cpu(1), copy)
     fresh = field.copy()
     for _ in range(2):  # the second time with used buffers
         field[:] = fresh
@@ -88,8 +88,8 @@ def check_ghost_cells(communicator, copy, grid, block_cells, dtype=np.float64):
 
 def check_chosen_ghosts(exchange, fresh, expected, mirror):
     """Only ghosts of marked cells are filled, of two fields together; those of an inflow, where no mark is, are not."""
-    kernels = Team.build((copy_cells, pack_cells, unpack_cells, *EXCHANGE), {"DIMENSIONS": 1})
-    chosen = ChosenGhosts(exchange, Team(1), kernels)
+    kernels = Cpu.build((copy_cells, pack_cells, unpack_cells, *EXCHANGE), {"DIMENSIONS": 1})
+    chosen = ChosenGhosts(exchange, Cpu(1), kernels)
     parity = np.where(mirror < 0, 0, 1 << np.maximum(mirror, 0))
     mark = np.where(np.isfinite(fresh[:, :1]), fresh[:, :1] % 3 == 1, 0).astype(np.int8)
     exchange.start(mark, np.array([-1]), np.zeros((3, 2, 1)))
@@ -115,7 +115,7 @@ def random_grid(rng):
 
 
 def check_ghosts(communicator):
-    copy = Team.build([copy_regions], {}).copy_regions
+    copy = Cpu.build([copy_regions], {}).copy_regions
     rng = np.random.default_rng(1)
     for _ in range(60):
         check_ghost_cells(communicator, copy, *random_grid(rng))
@@ -212,7 +212,7 @@ def check_own(blocks, everything, mine, home):
 def check_particles(communicator, grid, block_cells, number, reach):
     rng = np.random.default_rng(3)
     blocks = Blocks(grid, block_cells, communicator)
-    device = Team(1)
+    device = Cpu(1)
     exchange = ParticleExchange(blocks, device, device.build(EXCHANGE, {"DIMENSIONS": grid.dimensions}))
     everything = particle_columns(rng, number, grid.dimensions)
     holders = max(communicator.size - 1, 1)  # the last of several ranks starts with none

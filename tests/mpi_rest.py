@@ -134,9 +134,17 @@ tile_cells = [8]
 def plane(**given):
     """A ball of gas at high pressure near a corner of a block, in gas at rest, 2D."""
     values = {
-        "cells": [64, 44], "x": ["outflow", "wall"], "steps": 24, "scheme": "rk3", "inflow": "", "velocity": [0, 0],
-        "pressure": 20, "center": [27.5, 8.5], "block": [16, 12], "tile": [8, 4],
-    }  # fmt: skip
+        "cells": [64, 44],
+        "x": ["outflow", "wall"],
+        "steps": 24,
+        "scheme": "rk3",
+        "inflow": "",
+        "velocity": [0, 0],
+        "pressure": 20,
+        "center": [27.5, 8.5],
+        "block": [16, 12],
+        "tile": [8, 4],
+    }
     return PLANE.format(**values | given)
 
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
@@ -37,7 +37,7 @@ def solid(
     lower,
     upper,
     symmetric=(),
-    team=None,
+    device=None,
     block_cells=4,
     sources=(),
     viscosity=(1.0, 2.0),
@@ -61,7 +61,7 @@ def solid(
     )
     communicator = communicator or Communicator()
     blocks = Blocks(Grid.of(lower, upper, (16,) * D, kinds), scene.performance.block_cells, communicator)
-    return Solid(scene, blocks, communicator, team or Team(1))
+    return Solid(scene, blocks, communicator, device or Cpu(1))
 
 
 def step(part, impulse=None):
@@ -91,46 +91,46 @@ def digest(part):
     return len(ids), hashlib.sha256(text).hexdigest()
 
 
-def colliding_discs(team, communicator=None):
+def colliding_discs(device, communicator=None):
     """Two materials that meet near a symmetry plane and cross many blocks, one of them clamped."""
     left = body(d.Ball((-0.42, 0.3), 0.25), 0.05, 8930.0, (900.0, -400.0))
     clamp = d.HalfSpace((0.4, 0.0), (-1.0, 0.0))
     right = body(d.Ball((0.2, 0.3), 0.25), 0.04, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, clamp)
     box = (-1.0, 0.0), (1.0, 1.0), (1,)
-    return solid([left, right], *box, team, 2, sources=(Gravity((0.0, -1e3)),), communicator=communicator), 60
+    return solid([left, right], *box, device, 2, sources=(Gravity((0.0, -1e3)),), communicator=communicator), 60
 
 
-def colliding_balls(team):
+def colliding_balls(device):
     """Two balls in three dimensions, a quarter of each, whose particles resist clumping."""
     left = body(d.Ball((-0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (500.0, 0.0, 0.0))
     right = body(d.Ball((0.22, 0.0, 0.0), 0.2), 0.05, 8930.0, (-700.0, 0.0, 0.0))
-    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), team, 2, artificial_stress=0.3), 25
+    return solid([left, right], (-0.5, 0.0, 0.0), (0.5, 1.0, 1.0), (1, 2), device, 2, artificial_stress=0.3), 25
 
 
-def bonded_discs(team):
+def bonded_discs(device):
     """Two discs of bonded particles, a half of each, that meet and bounce."""
     left = body(d.Ball((-0.42, 0.0), 0.3), 0.05, 8930.0, (900.0, 0.0))
     right = body(d.Ball((0.3, 0.0), 0.3), 0.04, 2000.0, (-300.0, 0.0), SOFT_EOS, SOFT)
     bodies = [left, right]
-    return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), team, block_cells=2, form="total_lagrangian"), 80
+    return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), device, block_cells=2, form="total_lagrangian"), 80
 
 
-def discs_of_two_forms(team):
+def discs_of_two_forms(device):
     """A bonded disc between two of other forms and materials, of which one tears it apart."""
     failure = JohnsonCookFailure(0.1, 0.0, 0.0, 0.0, 0.0, 1.0, None, 0.0, None)
     bonded = body(d.Ball((0.0, 0.0), 0.25), 0.05, 2000.0, (0.0, 0.0), SOFT_EOS, SOFT, failure=failure)
     fast = body(d.Ball((-0.5, 0.1), 0.2), 0.05, 8930.0, (900.0, 0.0), form="updated_lagrangian")
     slow = body(d.Ball((0.6, 0.0), 0.2), 0.04, 2000.0, (-100.0, 0.0), SOFT_EOS, SOFT, form="updated_lagrangian")
     box = (-1.0, 0.0), (1.0, 1.0), (1,)
-    return solid([fast, bonded, slow], *box, team, 2, form="total_lagrangian"), 120
+    return solid([fast, bonded, slow], *box, device, 2, form="total_lagrangian"), 120
 
 
-def bursting_ball(team, communicator=None):
+def bursting_ball(device, communicator=None):
     """A ball that flies apart while it turns: stretched and cut bonds, pieces and debris, at a symmetry plane."""
     failure = JohnsonCookFailure(0.15, 0.0, 0.0, 0.0, 0.0, 1.0, math.inf, 0.0, Scatter(10.0, 0.1, 1))
     ball = body(d.Ball((0.0,) * 3, 0.4), 0.1, 2000.0, (0.0,) * 3, SOFT_EOS, SOFT, failure=failure)
     box = (-1.0, -1.0, 0.0), (1.0,) * 3, (2,)
-    part = solid([ball], *box, team, 2, form="total_lagrangian", communicator=communicator)
+    part = solid([ball], *box, device, 2, form="total_lagrangian", communicator=communicator)
     x = part.columns["position"]
     part.columns["velocity"] = 500.0 * x + 500.0 * np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
     return part, 90
@@ -142,7 +142,7 @@ def main():
     for case in (colliding_discs, colliding_balls, bonded_discs, discs_of_two_forms, bursting_ball):
         digests = []
         for threads in (1, 2):
-            part, steps = case(Team(threads))
+            part, steps = case(Cpu(threads))
             start = part.blocks.block_of(part.columns["position"])
             before = part.communicator.concatenate(np.stack([part.columns["id"], start], axis=1))
             for _ in range(steps):

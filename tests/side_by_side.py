@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from distfsi.device import cpu
-from distfsi.device.fold import flat_values
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
+from distfsi.device.source import flat_values
 
 
 class SideBySide:
-    """In the place of `Team.build` while it is installed.
+    """In the place of `Cpu.build` while it is installed.
 
     calls: how often each kernel was compared; unlike: kernels and arguments that differed
     """
@@ -26,7 +26,7 @@ class SideBySide:
         """Kernels `but_for` those named are run on the CPU alone."""
         self.calls, self.unlike, self.but_for = Counter(), Counter(), but_for
         self._build = cpu.build
-        monkeypatch.setattr(cpu.Team, "build", self.build)
+        monkeypatch.setattr(cpu.Cpu, "build", self.build)
 
     def build(self, drivers, constants, bindings=None, real="float64") -> SimpleNamespace:
         kernels = [Kernel(driver, constants, bindings or {}, real) for driver in drivers]

@@ -82,8 +82,10 @@ BROKEN = [
     (SOD + "[solid.bodies.a]\n", ["shape", "spacing", "density", "eos", "strength"]),
     (changed(BUBBLE, ("[fluid.inflow.x_high]", "[fluid.inflow.y_low]")), ["fluid.inflow.x_high", "fluid.inflow.y_low"]),
     (changed(BUBBLE, ("velocity", "velocity = [1]")), ["has 1 entries, needs 2"]),
-    (changed(TUBE, ("[fluid.phases.products]", "[fluid]\nreconstruction = 'weno5'\n[fluid.phases.products]")),
-     ["'weno5' looks past the cells beside a solid"]),
+    (
+        changed(TUBE, ("[fluid.phases.products]", "[fluid]\nreconstruction = 'weno5'\n[fluid.phases.products]")),
+        ["'weno5' looks past the cells beside a solid"],
+    ),
     (changed(TUBE, ("rho0", "")), ["fluid.phases.products.rho0"]),
     (changed(TUBE, ("R1", 'R1 = "4 m"')), ["has units m, needs a pure number"]),
     (changed(TUBE, ("energy", 'energy = "1 MJ/kg"')), ["has a sound speed only above"]),
@@ -94,16 +96,18 @@ BROKEN = [
     (changed(TUBE, ("n = ", "n = 0")), ["must be > 0"]),
     (changed(TUBE, ("melt_temperature", "melt_temperature = 100")), ["must be above room_temperature"]),
     (changed(TUBE, ("melt_temperature", 'melt_temperature = "20 degC"')), ["temperatures are given in K"]),
-    (changed(TUBE, ("density = \"7830", "density = 0")), ["must be > 0"]),
+    (changed(TUBE, ('density = "7830', "density = 0")), ["must be > 0"]),
     (changed(PLATES, ("[solid.bodies.right]", "[solid.bodies.left]")), ["is no TOML"]),
     (
         changed(PLATES, ("[solid.bodies.left]", "[solid]\nartificial_stress = 0.3\n[solid.bodies.left]")),
         ["solid.artificial_stress (line 23): bonds cannot clump; it needs form"],
     ),
     (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "-10 mm", upper = "1 mm"}')), ["overlaps body 'left'"]),
-    (changed(PLATES, ("shape", 'shape = {kind = "box", lower = "1 m", upper = "2 m"}')),
-     ["reaches beyond", "no particle"]),
-]  # fmt: skip
+    (
+        changed(PLATES, ("shape", 'shape = {kind = "box", lower = "1 m", upper = "2 m"}')),
+        ["reaches beyond", "no particle"],
+    ),
+]
 
 
 @pytest.mark.parametrize(("text", "faults"), BROKEN, ids=[" + ".join(faults)[:60] for _, faults in BROKEN])
@@ -166,9 +170,10 @@ TEXTS = st.sampled_from(
 )
 SCALARS = NUMBERS | TEXTS | st.booleans()
 VALUES = st.recursive(
-    SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from("abx"), inner, max_size=2),
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from("abx"), inner, max_size=2),
     max_leaves=4,
-)  # fmt: skip
+)
 
 
 def toml(value):

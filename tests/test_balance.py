@@ -49,7 +49,7 @@ class Part:
     """All the time goes into the last block."""
 
     def __init__(self, rank, work):
-        self._work, self.rank, self.seconds, self.team = np.array(work), rank, 0.0, self
+        self._work, self.rank, self.seconds, self.device = np.array(work), rank, 0.0, self
 
     def workload(self):
         return self._work

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.failure.johnson_cook import JohnsonCookFailure
 from distfsi.laws.solid.failure.principal_stress import PrincipalStress
@@ -215,8 +215,15 @@ def test_waves_in_steel_travel_with_their_speeds(extents, spacing, moves, speed)
 
 def stretched(strain_rate, failure=None, spacing=0.1, **keywords):
     """A bar of soft metal whose ends fly apart."""
-    bar = body(Box((-0.6, -0.2), (0.6, 0.2)), spacing, 1000.0, (0.0, 0.0), LinearEos(3.25e6),
-               PerfectlyPlastic(0.7e6, 2e4), failure=failure)  # fmt: skip
+    bar = body(
+        Box((-0.6, -0.2), (0.6, 0.2)),
+        spacing,
+        1000.0,
+        (0.0, 0.0),
+        LinearEos(3.25e6),
+        PerfectlyPlastic(0.7e6, 2e4),
+        failure=failure,
+    )
     part = total_lagrangian([bar], (-4.0, -1.0), (4.0, 1.0), block_cells=16, **keywords)
     part.columns["velocity"][:, 0] = strain_rate * part.columns["position"][:, 0]
     return part
@@ -455,11 +462,11 @@ def test_a_cantilever_swings_with_timoshenkos_period():
 
 @pytest.mark.parametrize("case", [bursting_ball, discs_of_two_forms])
 def test_a_restart_goes_on_to_the_same_bits(case):
-    part, steps = case(Team(1))
+    part, steps = case(Cpu(1))
     for _ in range(steps - 20):
         step(part)
     snapshot = {kind: {k: v.copy() for k, v in values.items()} for kind, values in part.snapshot().items()}
-    again, _ = case(Team(1))
+    again, _ = case(Cpu(1))
     again.restore(snapshot)
     for each in (part, again):
         for _ in range(20):
@@ -488,7 +495,7 @@ def test_verneys_shell_stops_at_its_radius():
 
 def test_bodies_of_different_forms_meet():
     """The energy and the momentum of all are kept, and the bonded body breaks."""
-    part, steps = discs_of_two_forms(Team(1))
+    part, steps = discs_of_two_forms(Cpu(1))
     before, whole = part.totals(), energy(part)
     assert len(part.pieces()["piece"]) == 1
     for _ in range(steps):

@@ -60,7 +60,7 @@ def test_a_body_that_leaves_has_left(tmp_path):
     assert "Conservation error" in text
 
 
-@pytest.mark.parametrize("scheme", ["cut_cells", "stairs"])
+@pytest.mark.parametrize("scheme", ["cut_cells", "staircase"])
 def test_gravity_on_fluid_and_body_closes(tmp_path, scheme):
     """A heavy gas, so that its weight counts."""
     slow = ("solid.bodies.ball.velocity=[0, 0]", "solid.bodies.ball.shape.center=['0.2 m', '0.1 m']")

@@ -78,13 +78,19 @@ def test_check_by_the_command_line(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("left", "right", "eos"),
     [
-        ((PureState(1.0, 1.0), Side(IdealGas(1.4), 1.0, 1.0, 0.0)),
-         (PureState(0.125, 0.1), Side(IdealGas(1.4), 0.125, 0.1, 0.0)), (AIR, AIR)),
-        ((WATER_AIR.left, Side(StiffenedGas(4.4, 6e8), 1000.0, 1e9, 0.0)),
-         (WATER_AIR.right, Side(IdealGas(1.4), 50.0, 1e5, 0.0)), (WATER_AIR.eos_left, WATER_AIR.eos_right)),
+        (
+            (PureState(1.0, 1.0), Side(IdealGas(1.4), 1.0, 1.0, 0.0)),
+            (PureState(0.125, 0.1), Side(IdealGas(1.4), 0.125, 0.1, 0.0)),
+            (AIR, AIR),
+        ),
+        (
+            (WATER_AIR.left, Side(StiffenedGas(4.4, 6e8), 1000.0, 1e9, 0.0)),
+            (WATER_AIR.right, Side(IdealGas(1.4), 50.0, 1e5, 0.0)),
+            (WATER_AIR.eos_left, WATER_AIR.eos_right),
+        ),
     ],
     ids=["sod", "water_air"],
-)  # fmt: skip
+)
 def test_meeting_states_form_those_of_the_exact_solution(left, right, eos):
     exact = exact_riemann(left[0], right[0], *eos)
     states = meet(left[1], right[1])
@@ -302,12 +308,15 @@ def test_advice_on_what_looks_wrong():
         ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
         ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
         ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
-        ("shock_bubble", ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],
-         "nothing varies along y: 1 dimension(s) without it"),
+        (
+            "shock_bubble",
+            ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],
+            "nothing varies along y: 1 dimension(s) without it",
+        ),
         ("shock_bubble", ["domain.cells=[4875, 1335]"], "750 cells across"),
         ("steel_tube", ["time.end=1 us"], "no wave comes nearer to the high y end than 0.0"),
     ],
-)  # fmt: skip
+)
 def test_excess_is_named(name, changes, words):
     told = advised(load(ROOT / "inputs" / f"{name}.toml", changes))
     assert sum(words in text for text in told) == 1
@@ -354,12 +363,19 @@ shape = {kind = "ball", center = [0, 0, 0.5], radius = 0.2}
         (['domain.z=["wall", "outflow"]'], ["z"]),
         (['domain.z=["wall", "outflow"]', "fluid.regions.0.velocity=[1, 0, 0]"], []),
         (['domain.z=["wall", "outflow"]', 'domain.x=["wall", "outflow"]'], []),
-        (['domain.x=["symmetry", "outflow"]', "domain.lower=[0, -1, 0]", "domain.cells=[20, 40, 40]",
-          'domain.z=["wall", "outflow"]'], []),
+        (
+            [
+                'domain.x=["symmetry", "outflow"]',
+                "domain.lower=[0, -1, 0]",
+                "domain.cells=[20, 40, 40]",
+                'domain.z=["wall", "outflow"]',
+            ],
+            [],
+        ),
         (['domain.z=["wall", "outflow"]', "domain.gravity=[0, 0, -9.81]"], ["z"]),
         (["fluid.regions.1.shape={kind='box', lower=[-0.1, -0.1, 0], upper=[0.1, 0.1, 1]}"], []),
     ],
-)  # fmt: skip
+)
 def test_a_line_of_symmetry_in_three_dimensions_is_named(tmp_path, changes, axes):
     path = tmp_path / "blast.toml"
     path.write_text(BLAST)

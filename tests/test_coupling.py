@@ -1,4 +1,4 @@
-"""The coupling: covered cells, forces, closed books, mirror images, and the same bits on any number of ranks."""
+"""The coupling: covered cells, forces, closed budgets, mirror images, and the same bits on any number of ranks."""
 
 import math
 
@@ -120,7 +120,7 @@ def test_a_heavy_piston_makes_the_pressure_of_its_speed(speed):
     assert p.mean() == pytest.approx(exact, rel=accuracy)
 
 
-# ---- books ----------------------------------------------------------------------------------------------------------
+# ---- budgets --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("dimensions", "phases"), [(1, AIR), (2, AIR), (2, AIR_AND_WATER), (3, AIR)])

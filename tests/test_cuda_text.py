@@ -32,10 +32,10 @@ NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "carry_unbonded", "
 FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
 CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
 CUT_CELLS += (redistribution, spreading, volumes)
-SCHEMES = {"paper": (covering, spreading, states), "cut_cells": CUT_CELLS}
-SCHEMES["stairs"] = SCHEMES["cut_cells"]
-OF_OTHER_SCHEMES = {"paper": set(), "cut_cells": {"round_apertures", "round_fractions"}}
-OF_OTHER_SCHEMES["stairs"] = {"absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
+SCHEMES = {"immersed_boundary": (covering, spreading, states), "cut_cells": CUT_CELLS}
+SCHEMES["staircase"] = SCHEMES["cut_cells"]
+OF_OTHER_SCHEMES = {"immersed_boundary": set(), "cut_cells": {"round_apertures", "round_fractions"}}
+OF_OTHER_SCHEMES["staircase"] = {"absorb", "put_moved", "cover_absorbed"}  # no cell is small before it is shut
 ALWAYS = {"copy_regions", "remember_peaks", "advance_tiles", "fastest_signals", "deform", "find_cells", "order_cells"}
 ALWAYS |= {"find_neighbours", "apply_impulse"}
 
@@ -63,7 +63,7 @@ def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, s
     D = dimensions
     path.write_text(
         f"""
-coupling = {{ scheme = "{scheme}"{", drop_below = 1" if scheme != "paper" else ""} }}
+coupling = {{ scheme = "{scheme}"{", drop_below = 1" if scheme != "immersed_boundary" else ""} }}
 domain = {{ lower = {[0] * D}, upper = {["16 mm"] * D}, cells = {[16] * D}, x = ["symmetry", "outflow"] }}
 time = {{ end = "1 ms" }}
 performance = {{ block_cells = {[8] * D}, tile_cells = {[8, 4, 4][:D]} }}
@@ -87,7 +87,7 @@ velocity = {[3000, 500, 250][:D]}
 [solid.bodies.plate]
 shape = {{ kind = "box", lower = {["1.4 mm", *["2 mm"] * (D - 1)]}, upper = {["2.1 mm", *["14 mm"] * (D - 1)]} }}
 spacing = "0.7 mm"
-{STEEL.replace("7830", "300" if scheme != "paper" else "7830")}
+{STEEL.replace("7830", "300" if scheme != "immersed_boundary" else "7830")}
 [solid.bodies.speck]
 shape = {{ kind = "box", lower = {["14 mm"] * D}, upper = {["14.7 mm"] * D} }}
 spacing = "0.7 mm"
@@ -112,12 +112,16 @@ def steps_side_by_side(monkeypatch, path, steps, overrides=()):
 @pytest.mark.parametrize(
     ("dimensions", "phases", "precision", "scheme", "form"),
     [
-        pytest.param(1, {"air": AIR}, "float32", "paper", "updated_lagrangian", marks=pytest.mark.full),
+        pytest.param(1, {"air": AIR}, "float32", "immersed_boundary", "updated_lagrangian", marks=pytest.mark.full),
         (2, {"air": AIR}, "float32", "cut_cells", "total_lagrangian"),
-        pytest.param(2, {"tnt": TNT, "air": AIR}, "float64", "paper", "updated_lagrangian", marks=pytest.mark.full),
-        pytest.param(2, {"tnt": TNT, "air": AIR}, "float32", "stairs", "total_lagrangian", marks=pytest.mark.full),
+        pytest.param(
+            2, {"tnt": TNT, "air": AIR}, "float64", "immersed_boundary", "updated_lagrangian", marks=pytest.mark.full
+        ),
+        pytest.param(2, {"tnt": TNT, "air": AIR}, "float32", "staircase", "total_lagrangian", marks=pytest.mark.full),
         pytest.param(3, {"air": AIR}, "float64", "cut_cells", "total_lagrangian", marks=pytest.mark.full),
-        pytest.param(3, {"tnt": TNT, "air": AIR}, "float32", "paper", "updated_lagrangian", marks=pytest.mark.full),
+        pytest.param(
+            3, {"tnt": TNT, "air": AIR}, "float32", "immersed_boundary", "updated_lagrangian", marks=pytest.mark.full
+        ),
     ],
 )
 def test_a_coupled_scene_call_by_call(monkeypatch, tmp_path, dimensions, phases, precision, scheme, form):

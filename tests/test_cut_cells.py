@@ -1,4 +1,4 @@
-"""Cut cells: geometry, uniform flow kept, pistons, closed books, thin plates that do not leak."""
+"""Cut cells: geometry, uniform flow kept, pistons, closed budgets, thin plates that do not leak."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -294,7 +294,7 @@ def test_a_disc_that_spins_in_gas_at_rest_does_nothing_to_it(packing, noise):
     assert volumes(case).sum() == pytest.approx(volume, rel=1e-5)
 
 
-# ---- books ----------------------------------------------------------------------------------------------------------
+# ---- budgets --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("thickness", [0.05, 0.025, pytest.param(1.0, marks=pytest.mark.full)])
@@ -333,21 +333,21 @@ def test_books_close_around_a_body_that_is_thrown_about(dimensions, phases):
     assert all(np.abs(made).max() < 1e-13 for made in case.coupling.budget_by_cause().values())
 
 
-def test_stairs_push_a_plate_of_one_cell():
-    """Its particles are up to half a cell farther from where stairs close cells than from where cut cells are cut."""
+def test_a_staircase_pushes_a_plate_of_one_cell():
+    """Its particles are up to half a cell farther from where it closes cells than from where cut cells are cut."""
     plate = body(Box((0.5,), (0.6,)), 0.025, 100.0, (0.0,), stiffness=1.0)
     regions = [(gas(1.4, 1.0, (0.0,)), None), (gas(1.4, 10.0, (0.0,)), Box((0.0,), (0.45,)))]
-    case = Coupled([plate], regions, (0.0,), (1.0,), (10,), (("wall", "wall"),), scheme="stairs")
+    case = Coupled([plate], regions, (0.0,), (1.0,), (10,), (("wall", "wall"),), scheme="staircase")
     for _ in range(12):
         dt, impulse = case.step()
     assert impulse[0] / dt > 5.0  # the pressures are 10 and 1 at the start
     assert np.abs(case.coupling.budget_by_cause()["wall"]).max() < 1e-12
 
 
-def test_stairs_keep_uniform_flow_and_all_books():
+def test_a_staircase_keeps_uniform_flow_and_the_budget():
     """Whole cells only, as a scheme to compare with."""
     n, u = 24, (1.0, 0.5)
-    ball, method = rigid(Ball((0.4, 0.4), 0.2), 0.5 / n, u), {"scheme": "stairs", "cfl": 0.5}
+    ball, method = rigid(Ball((0.4, 0.4), 0.2), 0.5 / n, u), {"scheme": "staircase", "cfl": 0.5}
     carried = Coupled([ball], [(gas(1.4, 1.0, u), None)], (0.0, 0.0), (1.0, 1.0), (n, n), (OPEN,) * 2, **method)
     ball = body(Ball((0.5, 0.4), 0.2), 0.025, 3.0, (0.7, 0.3))
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 5.0, (0, 0)), Box((0.0, 0.0), (0.2, 0.2)))]
@@ -504,14 +504,12 @@ TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in (
 
 @pytest.mark.parametrize(("thickness", "ratio"), TORN)
 def test_a_bonded_plate_is_torn_apart_under_pressure(thickness, ratio):
-    """Its bonds break, gas passes, no state is negative, and all books close."""
+    """Its bonds break, gas passes, no state is negative, and the budget closes."""
     h, fails = 1.0 / 24, PrincipalStress(1.0, 1e-3, Scatter(8.0, 1.0 / 24, 1))
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     plate = replace(body(Box((low, -0.2), (high, 1.2)), 0.5 * h, 3.0, (0, 0)), failure=fails)
     regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(sqrt(ratio), ratio, (0, 0)), Box((0.0, 0.0), (0.5, 1.0)))]
-    case = coupled(
-        [plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian"
-    )  # fmt: skip
+    case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (24, 24), block=24, form="total_lagrangian")
     c = case.solid.columns
     c["velocity"][:, 1] = 0.6 * np.sign(c["position"][:, 1] - 0.48)
     before, passed = case.balance(), False
@@ -645,7 +643,7 @@ def test_a_lone_particle_is_dragged_along_as_a_sphere(dimensions):
 
 @pytest.mark.parametrize("phases", [AIR, pytest.param(AIR_AND_WATER, marks=pytest.mark.full)])
 def test_a_cloud_of_debris_that_flies_apart_turns_to_dust(phases):
-    """All books close, no state is negative, and what was its wall opens."""
+    """The budget closes, no state is negative, and what was its wall opens."""
     places = 0.5 + 0.03 * (np.stack(np.meshgrid(*[np.arange(5)] * 2), -1).reshape(-1, 2) - 2.25)
     cloud = [speck(tuple(x), 0.02, 30.0, tuple(12.0 * (x - 0.5))) for x in places]
     regions = [(gas(1.0, 1.0, (0.2, 0)), None)]
@@ -734,7 +732,7 @@ def struck_plate(drop_below):
 
 
 def test_the_fluid_is_dropped_when_it_pushes_no_more():
-    """The plate flies on as with the fluid, all books close, and a restart before or after it ends in the same bits."""
+    """The plate flies on as with the fluid, the budget closes, and a restart before or after ends in the same bits."""
     kept, dropped, later, latest = struck_plate(None), struck_plate(0.02), struck_plate(0.02), struck_plate(0.02)
     before, at = dropped.balance(), None
     while dropped.simulation.time < 2.0:
@@ -860,9 +858,17 @@ def test_an_exponential_wave_in_water_throws_a_plate_as_taylor_says(psi):
     plate = body(Box((0.0,), (thickness,)), 0.5 * h, mass / thickness, (0,), stiffness=mass / thickness * sound**2)
     water = (gas(rho, base, (0,), 1), Box((low,), (0.5 * thickness,)))
     case = coupled(
-        [plate], [(gas(1.2, base, (0,)), None), water], (low,), (low + n * h,), (n,), (OPEN,), block=n, phases=phases,
-        cfl=0.5, runge_kutta="rk2",
-    )  # fmt: skip
+        [plate],
+        [(gas(1.2, base, (0,)), None), water],
+        (low,),
+        (low + n * h,),
+        (n,),
+        (OPEN,),
+        block=n,
+        phases=phases,
+        cfl=0.5,
+        runge_kutta="rk2",
+    )
     x, front = low + (np.arange(n) + 0.5) * h, -6 * h
     over = np.where(x < front, peak * np.exp((x - front) / (c * theta)), 0.0)
     W = primitives(case)[:, 0, 0]

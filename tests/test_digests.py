@@ -25,10 +25,26 @@ FAST = ("cantilever", "thin_plate", "tnt_air", "sod float32", "steel_tube gauges
 FAST_ON_TWO = ("sod float32", "steel_tube gauges")
 
 EVERYWHERE = {
-    "cantilever", "carbuncle", "cavitation", "interface", "leblanc", "noh", "piston", "plate_impact", "sedov",
-    "shock_bubble", "sod", "taylor_bar", "verney_shell", "water_air", "sod float32", "sedov float32", "sod hll",
-    "sedov rusanov", "water_air five_equation",
-}  # fmt: skip
+    "cantilever",
+    "carbuncle",
+    "cavitation",
+    "interface",
+    "leblanc",
+    "noh",
+    "piston",
+    "plate_impact",
+    "sedov",
+    "shock_bubble",
+    "sod",
+    "taylor_bar",
+    "verney_shell",
+    "water_air",
+    "sod float32",
+    "sedov float32",
+    "sod hll",
+    "sedov rusanov",
+    "water_air five_equation",
+}
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,13 @@ import pytest
 
 from distfsi.device import cpu, emit
 from distfsi.device.fingerprint import fingerprint
-from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.host import HostKernel
 from distfsi.device.kernel import Kernel
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import REALS, Array
 from distfsi.device.markers import driver, helper, load, row, store, workspace
 from distfsi.device.native import Native
+from distfsi.device.source import Bound, NotInSubset
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import Symbol, chosen
 from launch import ROOT

@@ -45,7 +45,7 @@ def test_products_of_tnt_drive_a_shock_into_air():
 @pytest.mark.parametrize("eos", [(WATER, AIR), (TNT, AIR)], ids=["water-air", "products-air"])
 @pytest.mark.parametrize("speed", [0.0, 1000.0])
 def test_interface_stays_in_balance(eos, speed):
-    """Uniform pressure and velocity stay uniform, and the books close."""
+    """Uniform pressure and velocity stay uniform, and the budget closes."""
     regions = (
         Region(FluidState(1, 1.2, 1e5, (speed,)), None),
         Region(FluidState(0, 1000.0 if eos[0] is WATER else 1.0, 1e5, (speed,)), Box((0.3,), (0.7,))),

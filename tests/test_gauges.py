@@ -294,7 +294,7 @@ def test_interpolation_leaves_out_what_is_covered(box):
     for block in range(box.fluid.blocks.local_count):
         x = box.fluid.blocks.cell_centers(block)[0]
         box.fluid.active(kind, block)[..., x > 1.0] = COVERED
-    coupling = SimpleNamespace(kind=DualArray(box.fluid.team, kind))
+    coupling = SimpleNamespace(kind=DualArray(box.fluid.device, kind))
     sampler = FluidSampler(box.fluid, coupling, np.array([[0.99, 0.3], [1.01, 0.3], [0.2, 0.2]]))
     density = sampler.values()[:, 1]
     assert density[0] == 5.0 and np.isnan(density[1]) and density[2] == 5.0
@@ -380,17 +380,24 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='point', position=0.5, every=0}"], "gauges.a.every (--set): 0; must be > 0"),
         (["gauges.a={kind='plane', axis='x', position=0}"], "gauges.a.axis (--set): 'x' in a domain of 1 dimension(s)"),
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
-        (["gauges.a={kind='pont', position=0}"],
-         "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
-         "did you mean 'point'?"),
-        (["gauges.a={kind='point', position=0.5, evry=1}"],
-         "gauges.a.evry (--set): unknown key; expected one of 'kind', 'position', 'every'; did you mean 'every'?"),
+        (
+            ["gauges.a={kind='pont', position=0}"],
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
+            "did you mean 'point'?",
+        ),
+        (
+            ["gauges.a={kind='point', position=0.5, evry=1}"],
+            "gauges.a.evry (--set): unknown key; expected one of 'kind', 'position', 'every'; did you mean 'every'?",
+        ),
         (["output.schlieren=true"], "output.schlieren (--set): needs two or three dimensions"),
         (["output.peaks=3"], "output.peaks (--set): 3; expected a table"),
-        (["output.peaks.ambient=3"], "output.peaks.ambient (--set): unknown key; expected one of 'ambient_pressure', "
-         "'arrival_overpressure'; did you mean 'ambient_pressure'?"),
+        (
+            ["output.peaks.ambient=3"],
+            "output.peaks.ambient (--set): unknown key; expected one of 'ambient_pressure', "
+            "'arrival_overpressure'; did you mean 'ambient_pressure'?",
+        ),
     ],
-)  # fmt: skip
+)
 def test_faults(overrides, expected):
     with pytest.raises(InputError) as caught:
         load(SOD, overrides)
@@ -424,12 +431,18 @@ def wall(tmp_path_factory):
     """Directory of a plane wave that a wall stops, in two dimensions; stopped and gone on with on the way."""
     directory = tmp_path_factory.mktemp("wall")
     words = [
-        "domain.lower=[0, 0]", "domain.upper=[1, 0.05]", "domain.cells=[100, 5]", "performance.block_cells=[32, 4]",
-        "domain.x=['outflow', 'wall']", "domain.y=['wall', 'wall']", f'output.directory="{directory}"',
-        "fluid.regions.1.shape={kind='box', lower=[0.5, -1], upper=[2, 1]}", "time.end=0.35",
+        "domain.lower=[0, 0]",
+        "domain.upper=[1, 0.05]",
+        "domain.cells=[100, 5]",
+        "performance.block_cells=[32, 4]",
+        "domain.x=['outflow', 'wall']",
+        "domain.y=['wall', 'wall']",
+        f'output.directory="{directory}"',
+        "fluid.regions.1.shape={kind='box', lower=[0.5, -1], upper=[2, 1]}",
+        "time.end=0.35",
         "gauges.face={kind='surface', side='x_high', every=0.1}",
         "gauges.point={kind='point', position=[0.995, 0.025]}",
-    ]  # fmt: skip
+    ]
     run(load(SOD, words), Communicator(), threads=1)
     return directory
 

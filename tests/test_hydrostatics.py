@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostRuntime
 from distfsi.diagnostics.budget import Budget
@@ -170,7 +170,7 @@ def test_a_gpu_makes_the_same_bits(precision):
         (WATER, AIR), layers, (8, 16), 10.0, 1.0, hydrostatic_level=5.0, performance=blocks, precision=precision
     )
     found = []
-    for device in (Team(1), Gpu(HostRuntime())):
+    for device in (Cpu(1), Gpu(HostRuntime())):
         simulation = Simulation.of(scene, Communicator(), device=device)
         for _ in range(4):
             simulation.step()

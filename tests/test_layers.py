@@ -25,7 +25,7 @@ LAYERS = (
     {"gauges"},
     {"laws"},
     {"formulas"},
-    {"errors", "narrowing", "__init__"},
+    {"air_blast", "errors", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}

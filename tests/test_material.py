@@ -328,7 +328,7 @@ def test_strength_of_concrete():
 
 
 def test_shear_wears_concrete_out_and_leaves_friction():
-    """Held at a pressure, the wear grows by equal steps to 1: at a strain of 0.04 (p* + T*)."""
+    """Held at a pressure, the damage grows by equal steps to 1: at a strain of 0.04 (p* + T*)."""
     point = Point(HJC_EOS, HJC, density=2440.0)
     pressure = hydrostat(point, 0.0008)
     worn = 0.04 * (pressure + 4e6) / 48e6

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpi_mesh
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.errors import InputError
 from distfsi.mesh.blocks import Blocks, Grid
 from distfsi.mesh.communicator import Communicator, check_launcher
@@ -147,7 +147,7 @@ def test_several_runs_of_one_rank_are_refused(communicator, monkeypatch):
 
 def test_symmetry_planes_too_close_together(communicator):
     grid = Grid.of((0.0,), (1.0,), (8,), (("symmetry", "symmetry"),))
-    device = Team(1)
+    device = Cpu(1)
     exchange = ParticleExchange(Blocks(grid, (4,), communicator), device, device.build(EXCHANGE, {"DIMENSIONS": 1}))
     with pytest.raises(InputError, match="that mirror are less than"):
         exchange.ghosts(np.zeros((1, 1)), np.zeros(1, dtype=np.int64), 0.5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from distfsi.device.emit import plain
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 from distfsi.laws.fluid.nasg import Nasg
 from independent import Material, Riemann, State
 from law_checks import check_law, check_tube

@@ -54,7 +54,7 @@ def texts_of(scene, monkeypatch):
             texts[driver.__name__, real] = text_of(driver, constants, bindings or {})
         return build(drivers, constants, bindings, real)
 
-    monkeypatch.setattr(cpu.Team, "build", staticmethod(keep))
+    monkeypatch.setattr(cpu.Cpu, "build", staticmethod(keep))
     Simulation.of(scene, Communicator(), 1)
     return texts
 

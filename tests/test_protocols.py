@@ -8,7 +8,7 @@ import pytest
 from distfsi.coupling.cut_cells.cut_cells import CutCells
 from distfsi.coupling.immersed_boundary.immersed_boundary import ImmersedBoundary
 from distfsi.coupling.protocol import Coupling, ReleasesFluid
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.gpu import Gpu, Runtime
 from distfsi.device.host import HostRuntime
 from distfsi.device.interface import Device
@@ -28,7 +28,7 @@ IMPLEMENTED = [
     (SolidForm, UpdatedLagrangian),
     (SolidForm, TotalLagrangian),
     (Structure, Solid),
-    (Device, Team),
+    (Device, Cpu),
     (Device, Gpu),
     (Runtime, HostRuntime),
 ]
@@ -71,12 +71,12 @@ def test_members_of_a_protocol_are_documented(protocol):
     assert all(member.__doc__ for member in members)
 
 
-@pytest.mark.parametrize("scheme", ["cut_cells", "stairs", "paper"])
+@pytest.mark.parametrize("scheme", ["cut_cells", "staircase", "immersed_boundary"])
 def test_a_coupled_run_has_the_attributes_of_the_protocols(scheme):
     scene = load(ROOT / "inputs/gas_piston.toml", ["domain.cells=30", f"coupling.scheme={scheme}"])
     simulation = Simulation.of(scene, Communicator(), 1)
     simulation.step()
-    parts = ((simulation.coupling, Coupling), (simulation.solid, Structure), (simulation.solid.team, Device))
+    parts = ((simulation.coupling, Coupling), (simulation.solid, Structure), (simulation.solid.device, Device))
     assert not [name for part, protocol in parts for name in attributes_of(protocol) if not hasattr(part, name)]
 
 

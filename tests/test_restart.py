@@ -154,9 +154,12 @@ class Launched:
         self.history = directory / "history.csv"
         self.before = self.rows()
         self.process = subprocess.Popen(
-            list(map(str, command)), env=os.environ | ENVIRONMENT, text=True, stdout=subprocess.PIPE,
+            list(map(str, command)),
+            env=os.environ | ENVIRONMENT,
+            text=True,
+            stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-        )  # fmt: skip
+        )
 
     def rows(self):
         return self.history.read_bytes() if self.history.exists() else b""

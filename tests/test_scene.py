@@ -193,6 +193,32 @@ def test_overrides_reach_tables_lists_and_names():
     assert (scene.performance.block_cells, scene.performance.tile_cells) == ((16, 8), (16, 8))
 
 
+SLAB = ROOT / "inputs" / "concrete_slab.toml"
+
+
+def test_former_words_are_read_with_a_note(tmp_path):
+    file = tmp_path / "slab.toml"
+    file.write_text(SLAB.read_text().replace("minimum_failure_strain", "least_failure_strain"))
+    scene, expected = load(file), load(SLAB)
+    assert scene.solid == expected.solid and expected.notes == ()
+    (note,) = scene.notes
+    assert note.startswith("slab.toml: solid.bodies.slab.strength.least_failure_strain (line ")
+    assert "is called minimum_failure_strain now" in note
+    tube = load(TUBE, ["coupling.scheme=paper"])
+    assert tube.coupling.scheme == "immersed_boundary"
+    assert tube.notes == (
+        "steel_tube.toml: coupling.scheme (--set): 'paper' is called 'immersed_boundary' now; read until 0.3.0",
+    )
+
+
+def test_a_former_key_beside_that_of_now_is_a_fault(faults):
+    text = SLAB.read_text().replace(
+        "minimum_failure_strain = 0.01", "minimum_failure_strain = 1\nleast_failure_strain = 1"
+    )
+    (fault,) = faults(text)
+    assert "least_failure_strain" in fault
+
+
 def test_faulty_overrides_are_told(faults):
     told = faults(
         GAS, "nonsense", "fluid.phases.gsa.gamma=1.3", "fluid.regions.1.density=1", "time.cfl=2", "time.end.x=1"
@@ -300,27 +326,38 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     [
         (["domain.upper=0"], "domain.upper (--set): must be greater than lower along x"),
         (['domain.x=["periodic", "wall"]'], "domain.x (--set): one end is periodic; expected both or none"),
-        (['domain.x=["wall"]'], "domain.x.1 (--set): is missing; expected one of 'wall', 'symmetry', 'outflow', "
-         "'inflow', 'periodic'"),
+        (
+            ['domain.x=["wall"]'],
+            "domain.x.1 (--set): is missing; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic'",
+        ),
         (["domain.x=wall"], 'domain.x (--set): "wall"; expected a list'),
         (['domain.y=["wall", "wall"]'], "domain.y (--set): the domain has 1 dimension(s), so no y ends"),
         (['domain.x=["inflow", "wall"]'], "fluid.inflow.x_low: is missing: the low x end of the domain is 'inflow'"),
         (["fluid.phases.gas.gamma=1"], "fluid.phases.gas.gamma (--set): 1; must be > 1"),
         (["fluid.regions=[]"], "fluid.regions (--set): is empty; expected an initial state"),
-        (["fluid.regions.0.pressure=-1"],
-         "fluid.regions.0.pressure (--set): too low: at this density 'gas' has a sound speed only above 0 Pa"),
+        (
+            ["fluid.regions.0.pressure=-1"],
+            "fluid.regions.0.pressure (--set): too low: at this density 'gas' has a sound speed only above 0 Pa",
+        ),
         (["fluid.regions.0.energy=1"], "fluid.regions.0 (line 11): give either pressure or energy, not both"),
-        (["fluid.regions.0.shape={kind='ball', center=0, radius=1}"],
-         "fluid.regions.0.shape (--set): the first region covers the whole domain; expected no shape"),
-        (["fluid.inflow.x_high={phase='gas', density=1, pressure=1}"],
-         "fluid.inflow.x_high (--set): has a state, but the high x end of the domain is 'outflow'; expected 'inflow'"),
+        (
+            ["fluid.regions.0.shape={kind='ball', center=0, radius=1}"],
+            "fluid.regions.0.shape (--set): the first region covers the whole domain; expected no shape",
+        ),
+        (
+            ["fluid.inflow.x_high={phase='gas', density=1, pressure=1}"],
+            "fluid.inflow.x_high (--set): has a state, but the high x end of the domain is 'outflow'; "
+            "expected 'inflow'",
+        ),
         (["performance.block_cells=[8, 8]"], "performance.block_cells (--set): has 2 entries, needs 1"),
         (["performance.block_cells=2"], "performance.block_cells (--set): 2; must be >= 4"),
-        (["performance.block_cells=8", "performance.tile_cells=9"],
-         "performance.tile_cells (--set): a tile is larger than a block"),
+        (
+            ["performance.block_cells=8", "performance.tile_cells=9"],
+            "performance.tile_cells (--set): a tile is larger than a block",
+        ),
         (["time.end=inf"], "time.end (--set): Infinity is not finite"),
     ],
-)  # fmt: skip
+)
 def test_faults_between_the_parts_of_a_fluid(faults, overrides, expected):
     assert faults(GAS, *overrides) == [expected]
 
@@ -328,26 +365,44 @@ def test_faults_between_the_parts_of_a_fluid(faults, overrides, expected):
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        (['domain.x=["periodic", "periodic"]', "solid.bodies.tube.shape.center=[0.04, 0]"],
-         ["domain.x (--set): periodic; a scene with solids needs ends of another kind"]),
-        (["solid.bodies.tube.spacing=0.4 mm"],
-         ["solid.bodies.tube.spacing (--set): 0.0004 m is too coarse for the fluid cells; expected at most 0.000375 m, "
-          "0.75 of the smallest cell; half a cell is better"]),
-        (["solid.bodies.tube.shape.center=[1, 1]"],
-         ["solid.bodies.tube.shape (line {tube}): reaches beyond the high x end of the domain, which is 'outflow'; "
-          "only 'symmetry' may cut a body",
-          "solid.bodies.tube.shape (line {tube}): reaches beyond the high y end of the domain, which is 'outflow'; "
-          "only 'symmetry' may cut a body",
-          "solid.bodies.tube.shape (line {tube}): no particle of it lies inside the domain"]),
-        (["solid.bodies.tube.shape.inner_radius=35 mm"],
-         ["solid.bodies.tube.shape (line {tube}): inner_radius must be smaller than outer_radius"]),
-        (["solid.bodies.tube.strength.melt_temperature=200"],
-         ["solid.bodies.tube.strength (line {strength}): melt_temperature must be above room_temperature"]),
-        (["fluid.regions.1.energy=0.4 MJ/kg"],
-         ["fluid.regions.1.energy (--set): too low: at this density 'products' has a sound speed only above "
-          "1.66677e+06 J/kg"]),
+        (
+            ['domain.x=["periodic", "periodic"]', "solid.bodies.tube.shape.center=[0.04, 0]"],
+            ["domain.x (--set): periodic; a scene with solids needs ends of another kind"],
+        ),
+        (
+            ["solid.bodies.tube.spacing=0.4 mm"],
+            [
+                "solid.bodies.tube.spacing (--set): 0.0004 m is too coarse for the fluid cells; "
+                "expected at most 0.000375 m, 0.75 of the smallest cell; half a cell is better"
+            ],
+        ),
+        (
+            ["solid.bodies.tube.shape.center=[1, 1]"],
+            [
+                "solid.bodies.tube.shape (line {tube}): reaches beyond the high x end of the domain, "
+                "which is 'outflow'; only 'symmetry' may cut a body",
+                "solid.bodies.tube.shape (line {tube}): reaches beyond the high y end of the domain, "
+                "which is 'outflow'; only 'symmetry' may cut a body",
+                "solid.bodies.tube.shape (line {tube}): no particle of it lies inside the domain",
+            ],
+        ),
+        (
+            ["solid.bodies.tube.shape.inner_radius=35 mm"],
+            ["solid.bodies.tube.shape (line {tube}): inner_radius must be smaller than outer_radius"],
+        ),
+        (
+            ["solid.bodies.tube.strength.melt_temperature=200"],
+            ["solid.bodies.tube.strength (line {strength}): melt_temperature must be above room_temperature"],
+        ),
+        (
+            ["fluid.regions.1.energy=0.4 MJ/kg"],
+            [
+                "fluid.regions.1.energy (--set): too low: at this density 'products' has a sound speed only above "
+                "1.66677e+06 J/kg"
+            ],
+        ),
     ],
-)  # fmt: skip
+)
 def test_faults_between_fluid_and_solid(overrides, expected):
     with pytest.raises(InputError) as caught:
         load(TUBE, overrides)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.emit import Emission
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostRuntime
@@ -62,7 +62,7 @@ def test_a_source_that_changes_has_the_kernel_of_one_that_does_not():
     assert text_with(Ramp((0.0, 3.0)))[0] == text_with(Gravity((0.0, -9.81)))[0]
 
 
-@pytest.mark.parametrize("device", [Team(1), Gpu(HostRuntime())], ids=["cpu", "gpu"])
+@pytest.mark.parametrize("device", [Cpu(1), Gpu(HostRuntime())], ids=["cpu", "gpu"])
 def test_a_kernel_gets_the_value_of_the_moment(device):
     force = BodyForce([Ramp((3.0,)), Gravity((1.0,))], 1)
     kernel = device.build([fall], {"BODY_FORCE": force.acceleration}).fall

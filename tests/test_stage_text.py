@@ -96,7 +96,7 @@ def calls():
         return type("Kernels", (), {driver.__name__: staticmethod(keeping(driver)) for driver in drivers})
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cpu.Team, "build", staticmethod(keep))
+        patch.setattr(cpu.Cpu, "build", staticmethod(keep))
         simulation = Simulation.of(blast(("air",), 3, scheme="rk2"), Communicator(), 1)
         for _ in range(2):
             simulation.step()

@@ -17,6 +17,7 @@ from distfsi.output.storage import prepare_directory, storage
 from test_output import OneRank, contents, read_with_vtk, same
 
 SCRIPT = Path(__file__).with_name("mpi_output.py")
+NOBODY = 65534  # a user without rights
 SOD = (
     "run",
     launch.ROOT / "inputs/sod.toml",
@@ -191,10 +192,22 @@ def test_a_file_in_place_of_the_folder(mpiexec, tmp_path):
 
 
 def test_a_folder_without_permission(mpiexec, tmp_path):
-    if os.getuid() == 0:
-        pytest.skip("NOT RUN: root may write everywhere; the read-only file system is tested instead")
+    """Root may write everywhere: then another user tries."""
     tmp_path.chmod(0o500)
-    assert_refused(mpiexec, tmp_path / "out", "Permission denied")
+    if os.getuid() > 0:
+        assert_refused(mpiexec, tmp_path / "out", "Permission denied")
+        return
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.setuid(NOBODY)
+            prepare_directory(tmp_path / "out", OneRank())
+        except InputError as error:
+            code = 0 if str(error).endswith("cannot be written to: Permission denied") else 2
+        finally:
+            os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 def test_a_read_only_file_system(mpiexec, mounted):

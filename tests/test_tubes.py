@@ -264,9 +264,17 @@ def test_adaptive_flux_has_the_same_bits_on_any_cut(dimensions):
     results = []
     for block, tile in (((64,) * D, (64,) * D), ((7, 5, 4)[:D], (3, 2, 3)[:D])):
         scene = scene_of(
-            (AIR,), regions, (0.0,) * D, (1.0, 0.6, 0.5)[:D], cells, 2e-4, (("wall", "outflow"),) * D,
-            riemann="adaptive", performance=Performance(block, tile), **SECOND_ORDER,
-        )  # fmt: skip
+            (AIR,),
+            regions,
+            (0.0,) * D,
+            (1.0, 0.6, 0.5)[:D],
+            cells,
+            2e-4,
+            (("wall", "outflow"),) * D,
+            riemann="adaptive",
+            performance=Performance(block, tile),
+            **SECOND_ORDER,
+        )
         results.append(fields(advance(start(scene))))
     for name, values in results[0].items():
         assert np.array_equal(values, results[1][name]), name

@@ -12,8 +12,8 @@ from numba import typeof
 from distfsi.coupling.cut_cells.kernels import forces, nodal_distance
 from distfsi.coupling.kernels import spreading
 from distfsi.device import llvm_text
-from distfsi.device.fold import parameters_of
 from distfsi.device.native import Native
+from distfsi.device.source import parameters_of
 from distfsi.diagnostics.kernels import peaks
 from distfsi.fluid.kernels import rows as fluid
 from distfsi.fluid.kernels.records import StageStep
@@ -25,9 +25,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROWS = (fluid.primitives_row, fluid.increments_row, fluid.flux_row, fluid.update_row, signal_row, peaks.peaks_row)
-REALS = {"rx", "ry", "rz", "ambient", "threshold", "time", "dt", "faces_rate"} | {
-    f"step_{name}" for name in StageStep._fields
-}
+REALS = {"rx", "ry", "rz", "limits_ambient", "limits_arrival", "step_time", "faces_rate"}
+REALS |= {f"step_{name}" for name in StageStep._fields}
+ARRAYS = ("states_", "step_before", "step_after")
 SCENES = {
     "water-air-2D": (("water", "air"), 2, "float64"),
     "products-air-3D": (("tnt", "air"), 3, "float64"),
@@ -55,7 +55,7 @@ def native_row(row, scene):
     model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
     arguments = [
         np.zeros(1, np.uint8 if name == "K" else real)
-        if name.isupper() or name.startswith(("U_", "states_"))
+        if name.isupper() or name.startswith(ARRAYS)
         else np.dtype(real).type(0)
         if name in REALS
         else 0

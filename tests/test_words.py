@@ -1,7 +1,4 @@
-"""The words of the code and its documents are the field's: the glossary is true, and old words only become fewer.
-
-`python tests/test_words.py > tests/words_still_used.txt` writes anew which files still use which old words.
-"""
+"""The words of the code and its documents are the field's: the glossary is true, and old words are gone."""
 
 import ast
 import re
@@ -13,7 +10,6 @@ import pytest
 from launch import ROOT
 
 GLOSSARY = ROOT / "docs" / "glossary.md"
-STILL_USED = Path(__file__).with_name("words_still_used.txt")
 MEANINGS, _, NOT_USED = GLOSSARY.read_text().partition("## Words not used")
 ROW = re.compile(r"^\| (?!-|term|word)(.+?) \| (.*?) \| (.*?) ?\|$", re.MULTILINE)
 OLD = {
@@ -66,19 +62,9 @@ def files() -> Iterator[Path]:
     yield from sorted({path for pattern in PROSE_FILES for path in ROOT.glob(pattern) if path.is_file()} - EXCEPT)
 
 
-def still_used() -> dict[str, set[str]]:
-    """The old words of each file that uses some."""
+def test_no_file_uses_an_old_word():
     found = {str(path.relative_to(ROOT)): old_words_in(path.read_text(), path.suffix == ".py") for path in files()}
-    return {path: words for path, words in found.items() if words}
-
-
-def test_old_words_are_only_where_the_list_has_them():
-    """A file that has lost one leaves the list, too."""
-    lines = (line.partition(": ") for line in STILL_USED.read_text().splitlines())
-    listed = {path: set(words.split()) for path, _, words in lines}
-    found = still_used()
-    for path in found.keys() | listed.keys():
-        assert found.get(path, set()) == listed.get(path, set()), path
+    assert {path: words for path, words in found.items() if words} == {}
 
 
 @pytest.mark.parametrize(
@@ -110,7 +96,3 @@ def test_the_glossary_is_in_order():
     for section in MEANINGS.split("\n## ")[1:]:
         terms = [term.lower() for term, _, _ in ROW.findall(section)]
         assert terms == sorted(terms)
-
-
-if __name__ == "__main__":
-    print("\n".join(f"{path}: {' '.join(sorted(words))}" for path, words in still_used().items()))

@@ -39,9 +39,11 @@ def scene_of(
     dimensions = len(cells)
     phases = tuple(Phase(f"phase {k}", material) for k, material in enumerate(eos))
     fluid = Fluid(
-        phases, regions, inflow=((None, None),) * dimensions,
+        phases,
+        regions,
+        inflow=((None, None),) * dimensions,
         **{"reconstruction": "minmod", "minimum_volume_fraction": TRACE, "precision": "float64"} | method,
-    )  # fmt: skip
+    )
     return Scene(
         title="",
         domain=Domain(lower, upper, cells, boundaries or (OPEN,) * dimensions),

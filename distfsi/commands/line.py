@@ -17,7 +17,20 @@ from importlib import import_module
 from distfsi import __version__
 from distfsi.errors import DistfsiError, InputError
 
-COMMANDS = ("run", "check", "compile", "plot", "info", "examples", "study", "bench", "doctor", "schema")
+COMMANDS = (
+    "run",
+    "check",
+    "compile",
+    "plot",
+    "info",
+    "examples",
+    "materials",
+    "blast",
+    "study",
+    "bench",
+    "doctor",
+    "schema",
+)
 
 DESCRIPTION = "Shock waves and blasts that hit structures."
 EXAMPLES = """\

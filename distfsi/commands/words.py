@@ -29,6 +29,16 @@ def seconds(text: str) -> float:
     return _quantity(text, "s")
 
 
+def kilograms(text: str) -> float:
+    """A mass in kilograms, or with its own unit."""
+    return _quantity(text, "kg")
+
+
+def metres(text: str) -> float:
+    """A length in metres, or with its own unit."""
+    return _quantity(text, "m")
+
+
 def plane(text: str) -> tuple[int, float]:
     """`AXIS=POSITION`: number of the axis, position in metres or with its own unit."""
     axis, equals, position = text.partition("=")

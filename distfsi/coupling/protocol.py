@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Stage
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.blocks import Snapshot
 
 
@@ -28,23 +28,29 @@ class Coupling(Protocol):
     it: the `geometry` of the step, the `cells` of the stage, the `transfer`; what is in them is the coupling's alone,
     but for `transfer.impulse`. All else may be asked for between steps.
 
-    team       the device, whose seconds are those of the coupling alone
+    device     the device, whose seconds are those of the coupling alone
     reach      [m]: how far the solid's ghosts and images must go
     sub_steps  how many sub-steps of the solid a step has at most
     stray      [m]: how far particles may go between two migrations, if there are sub-steps
-    causes     of what the coupling creates or takes, keys of budget_by_cause()
-    at_ends    those of them that pass the ends of the domain with bodies: they have come in, or left
-    kind       field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
-               coupling/kernels/cells.py
     """
 
-    team: Device
+    device: Device
     reach: float
     sub_steps: int
     stray: float
-    causes: tuple[str, ...]
-    at_ends: tuple[str, ...]
-    kind: DualArray
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Of what the coupling creates or takes, keys of budget_by_cause()."""
+
+    @property
+    def at_ends(self) -> tuple[str, ...]:
+        """Those of the causes that pass the ends of the domain with bodies: they have come in, or left."""
+
+    @property
+    def kind(self) -> DualArray:
+        """Field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
+        coupling/kernels/cells.py."""
 
     def time_step(self) -> float:
         """Longest step [s] that this rank's particles allow, or sub-step when the wall moves on; inf: any."""

@@ -12,10 +12,9 @@ from pathlib import Path
 
 def cache_directory() -> Path:
     """Where compiled modules live: $DISTFSI_CACHE, else the user's cache folder."""
-    root = os.environ.get("DISTFSI_CACHE")
-    if root is None:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
-    return Path(root)
+    if (root := os.environ.get("DISTFSI_CACHE")) is not None:
+        return Path(root)
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
 
 
 def write_whole(path: Path, content: bytes) -> None:

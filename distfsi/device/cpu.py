@@ -9,18 +9,19 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from copy import copy
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from distfsi.device.cache import cache_directory
-from distfsi.device.fold import Bound, NotInSubset
 from distfsi.device.native import Native
+from distfsi.device.source import Bound, NotInSubset
 
-__all__ = ["Bound", "NotInSubset", "Team", "build", "cache_directory"]
+__all__ = ["Bound", "NotInSubset", "Cpu", "build", "cache_directory"]
 
 
 def build(
-    drivers: Iterable[Callable],
+    drivers: Iterable[Callable[..., Any]],
     constants: Mapping[str, object],
     bindings: Mapping[str, Bound | type] | None = None,
     real: str = "float64",
@@ -34,7 +35,7 @@ def build(
     return SimpleNamespace(**{d.__name__: Native(d, constants, bindings or {}, real) for d in drivers})
 
 
-class Team:
+class Cpu:
     """Threads of one rank that share the items of a driver call: the CPU as a device (device/interface.py).
 
     seconds: how long the calls have taken so far
@@ -49,13 +50,13 @@ class Team:
         self.threads, self.seconds = max(1, threads), 0.0
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
-    def with_own_clock(self) -> Team:
+    def with_own_clock(self) -> Cpu:
         """The same threads, whose seconds are counted apart."""
-        team = copy(self)
-        team.seconds = 0.0
-        return team
+        same = copy(self)
+        same.seconds = 0.0
+        return same
 
-    def run(self, kernel: Callable, count: int, *arguments) -> None:
+    def run(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
         """Call `kernel(begin, end, *arguments)` on ranges that together cover 0 … count."""
         started = clock.perf_counter()
         self._share(kernel, count, *arguments)
@@ -64,7 +65,7 @@ class Team:
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
         return wanted
 
-    def run_few(self, kernel: Callable, count: int, *arguments) -> None:
+    def run_few(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
         """Call `kernel(0, count, *arguments)` on this thread."""
         if count:
             kernel(0, count, *arguments)
@@ -94,7 +95,7 @@ class Team:
     def download_to(self, message: np.ndarray, array: np.ndarray) -> None:
         self.upload(message, array)
 
-    def asynchronous(self) -> nullcontext:
+    def asynchronous(self) -> nullcontext[None]:
         return nullcontext()
 
     def join_asynchronous(self) -> None:
@@ -109,7 +110,7 @@ class Team:
     def seconds_between(self, first: float, then: float) -> float:
         return then - first
 
-    def _share(self, function: Callable, count: int, *arguments) -> None:
+    def _share(self, function: Callable[..., Any], count: int, *arguments: Any) -> None:
         if self._pool is None or count < 2:
             if count:
                 function(0, count, *arguments)

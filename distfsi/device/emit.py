@@ -10,39 +10,32 @@ import ast
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from distfsi.device import markers
-from distfsi.device.fold import (
-    NUMBERS,
-    Bound,
-    Callee,
-    Changing,
-    Fold,
-    NotInSubset,
-    Number,
-    Source,
-    copied,
-    given,
-    is_fixed,
-    literal,
-)
+from distfsi.device.expressions import NUMBERS
+from distfsi.device.fold import Fold
+from distfsi.device.source import Bound, Callee, NotInSubset, Source
+from distfsi.device.trees import Changing, Number, copied, given, is_fixed, literal
 from distfsi.formulas.subset import Varying
+from distfsi.narrowing import of_kind
 
 
 class _Numbered(ast.NodeTransformer):
     """Each Number, changing or not, becomes an item of the tuple of numbers."""
 
     def __init__(self, numbers: dict[str, float | Varying]):
-        self.numbers, self.places, self.found = numbers, list(numbers), False
+        self.numbers, self.positions, self.found = numbers, list(numbers), False
 
     def visit_Number(self, node: Number | Changing) -> ast.expr:
         self.found = True
         if node.id not in self.numbers:
+            assert node.value is not None
             self.numbers[node.id] = node.value
-            self.places.append(node.id)
-        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.places.index(node.id)), ast.Load())
+            self.positions.append(node.id)
+        return ast.Subscript(ast.Name(NUMBERS, ast.Load()), ast.Constant(self.positions.index(node.id)), ast.Load())
 
     visit_Changing = visit_Number
 
@@ -63,6 +56,26 @@ class Numbers:
         return tuple(map(self._real, values))
 
 
+def given_numbers(constants: Mapping[str, object], bindings: Mapping[str, Bound | type]) -> dict[str, float | Varying]:
+    """All floats that a scene gives, by their labels: what the names of Numbers are expressions of."""
+    found: dict[str, float | Varying] = {}
+
+    def put(value: object, label: str) -> None:
+        if isinstance(value, tuple):
+            for k, item in enumerate(value):
+                put(item, f"{label}[{k}]")
+        elif isinstance(value, (float, Varying)):
+            found[label] = value
+
+    for name, value in constants.items():
+        put(value, name)
+    for word, bound in bindings.items():
+        if isinstance(bound, Bound):
+            for name, value in bound.constants.items():
+                put(value, f"{bound.owner or word}.{name}")
+    return found
+
+
 @dataclass
 class Emission:
     """The functions that `driver` reaches, folded, callees first.
@@ -74,9 +87,11 @@ class Emission:
     bindings: Mapping[str, Bound | type]
     functions: dict[str, tuple[Source, ast.FunctionDef]] = field(default_factory=dict)
     numbers: dict[str, float | Varying] = field(default_factory=dict)
-    _callees: dict[tuple[Callable, type | None, str], Callee] = field(default_factory=dict)
+    _callees: dict[tuple[Callable[..., Any], type | None, str], Callee] = field(default_factory=dict)
 
-    def add(self, function: Callable, scope: Bound | None = None, suffix: str = "", law: type | None = None) -> Callee:
+    def add(
+        self, function: Callable[..., Any], scope: Bound | None = None, suffix: str = "", law: type | None = None
+    ) -> Callee:
         """Fold `function`, perhaps a formula of a `law`, and all it calls, with the constants of `scope`."""
         key = (function, law, suffix)
         if key in self._callees:
@@ -84,10 +99,10 @@ class Emission:
         source = Source(function, self._records() | ({"self": law} if law else {}))
         name = source.name + suffix
         if name in self.functions:
-            raise NotInSubset(f"{source.place}: {name} is also the name of {self.functions[name][0].place}")
-        self.functions[name] = source, ast.FunctionDef()  # its name is taken
-        lookup, call = (partial(find, source, scope, suffix) for find in (self._constant, self._callee))
-        fold = Fold(source, lookup, call)
+            raise NotInSubset(f"{source.location}: {name} is also the name of {self.functions[name][0].location}")
+        self.functions[name] = source, source.tree()  # its name is taken
+        given = source, scope, suffix
+        fold = Fold(source, partial(self._constant, *given), partial(self._callee, *given))
         tree = fold.run()
         tree.name, count = name, len(tree.args.args)
         result = _fixed_result(tree)
@@ -103,14 +118,14 @@ class Emission:
 
     def add_bound(self, name: str) -> Callee:
         """Fold the formula that the scene binds to a name."""
-        bound = self.bindings[name]
+        bound = of_kind(Bound, self.bindings[name])
         return self.add(bound.function, bound, "__" + name, bound.law)
 
     def _records(self) -> dict[str, type]:
         """The records that the scene chooses."""
         return {name: class_ for name, class_ in self.bindings.items() if isinstance(class_, type)}
 
-    def root(self, function: Callable) -> str:
+    def root(self, function: Callable[..., Any]) -> str:
         """Fold a driver, which gets the numbers one by one behind its other arguments; the name it is emitted under."""
         callee = self.add(function)
         _, tree = self.functions[callee.name]
@@ -154,8 +169,9 @@ def number_names(count: int) -> list[str]:
 
 def _fixed_result(tree: ast.FunctionDef) -> ast.expr | None:
     """What a function merely returns, if that is the same in every call."""
-    fixed = len(tree.body) == 1 and isinstance(tree.body[0], ast.Return) and is_fixed(tree.body[0].value)
-    return copied(tree.body[0].value) if fixed else None
+    only = tree.body[0] if len(tree.body) == 1 else None
+    value = only.value if isinstance(only, ast.Return) else None
+    return copied(value) if value is not None and is_fixed(value) else None
 
 
 def callees_first(
@@ -164,20 +180,22 @@ def callees_first(
     """Only what the `roots`, by default the last of the functions, still call after folding: callees first."""
     ordered: dict[str, tuple[Source, ast.FunctionDef]] = {}
 
-    def place(name: str) -> None:
+    def arrange(name: str) -> None:
         if name in ordered or name not in functions:
             return
         for node in ast.walk(functions[name][1]):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                place(node.func.id)
+                arrange(node.func.id)
         ordered[name] = functions[name]
 
-    for root in [next(reversed(functions))] if roots is None else roots:
-        place(root)
+    for root in list(functions)[-1:] if roots is None else roots:
+        arrange(root)
     return list(ordered.values())
 
 
-def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound] | None = None) -> Callable:
+def plain(
+    function: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound | type] | None = None
+) -> Callable[..., Any]:
     """`function` as plain Python with the scene's values in place: for set-up, tests and debugging.
 
     Works on numpy arrays too, as long as the formula makes no choices.
@@ -185,7 +203,7 @@ def plain(function: Callable, constants: Mapping[str, object], bindings: Mapping
     emission = Emission(constants, bindings or {})
     name = emission.root(function)
     words = {"sqrt": np.sqrt, "exp": np.exp, "log": np.log, "pow": np.power, "floor": np.floor, "workspace": np.empty}
-    namespace = {**words, "load": markers.load, "store": markers.store, "real": float, "int32": int}
+    namespace: dict[str, Any] = {**words, "load": markers.load, "store": markers.store, "real": float, "int32": int}
     namespace |= {"min": lambda a, b: a if a < b else b, "max": lambda a, b: a if a > b else b}
     for _, tree in callees_first(emission.functions):
         exec(compile(ast.unparse(tree), f"<{name}>", "exec"), namespace)

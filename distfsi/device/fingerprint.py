@@ -10,53 +10,54 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import CodeType
+from typing import Any
 
-from distfsi.device.fold import Bound, Source, fields_of, is_record
+from distfsi.device.source import Bound, Source, fields_of, is_record
 from distfsi.formulas.subset import Varying
 
 WITHOUT_REFERENCES = 2  # marshal's format whose bytes depend on the code alone
 
 
 def fingerprint(
-    driver: Callable, constants: Mapping[str, object], bindings: Mapping[str, Bound | type], real: str
+    driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound | type], real: str
 ) -> str:
     """A hash of the functions that a driver can reach, as Python has compiled them, and of what a scene gives to the
     names in them: constants, formulas and records, but of floats only whether they are 0."""
-    seen: set[tuple] = set()
-    told = hashlib.sha256(texts_depend_on() + real.encode())
+    seen: set[tuple[object, ...]] = set()
+    digest = hashlib.sha256(texts_depend_on() + real.encode())
     chosen = {name: record for name, record in bindings.items() if isinstance(record, type)}
 
-    def tell(function: Callable, scope: Mapping[str, object], owner: str, law: type | None) -> None:
+    def add(function: Callable[..., Any], scope: Mapping[str, object], owner: str, law: type | None) -> None:
         if (function, owner, law) in seen:
             return
         seen.add((function, owner, law))
         code, names = _compiled(function)
-        told.update(code)
+        digest.update(code)
         source = Source(function, chosen | ({"self": law} if law else {}))
         records = [record for record in source.parameters.values() if record is not None]
-        told.update(repr([(record, fields_of(record)) for record in records]).encode())
+        digest.update(repr([(record, fields_of(record)) for record in records]).encode())
         for name in names:
             for known in (name, f"self.{name}"):
                 if known in scope:
-                    told.update(f"{known} of {owner} = {_shape(scope[known])}".encode())
+                    digest.update(f"{known} of {owner} = {_shape(scope[known])}".encode())
                 elif known in constants:
-                    told.update(f"{known} = {_shape(constants[known])}".encode())
+                    digest.update(f"{known} = {_shape(constants[known])}".encode())
             bound = bindings.get(name)
             if isinstance(bound, Bound):
-                told.update(f"{name} is {bound.owner}".encode())
-                tell(bound.function, bound.constants, bound.owner or name, bound.law)
+                digest.update(f"{name} is {bound.owner}".encode())
+                add(bound.function, bound.constants, bound.owner or name, bound.law)
                 continue
             value = function.__globals__.get(name)
             for callee, its_law in [(value, None), *((getattr(record, name, None), record) for record in records)]:
-                if hasattr(callee, "__code__"):
-                    tell(callee, scope, owner, its_law)
+                if callee is not None and hasattr(callee, "__code__"):
+                    add(callee, scope, owner, its_law)
             if is_record(value):
-                told.update(repr(fields_of(value)).encode())
+                digest.update(repr(fields_of(value)).encode())
             if isinstance(value, (bool, int, float, tuple)):
-                told.update(f"{name} = {value!r}".encode())
+                digest.update(f"{name} = {value!r}".encode())
 
-    tell(driver, {}, "", None)
-    return told.hexdigest()[:20]
+    add(driver, {}, "", None)
+    return digest.hexdigest()[:20]
 
 
 def _shape(value: object) -> str:
@@ -76,11 +77,11 @@ def texts_depend_on() -> bytes:
 
 
 @cache
-def _compiled(function: Callable) -> tuple[bytes, list[str]]:
+def _compiled(function: Callable[..., Any]) -> tuple[bytes, list[str]]:
     """What Python has made of a function, and the names of other modules in it."""
     code, kind = function.__code__, getattr(function, "__kind__", "")
-    told = f"{function.__module__} {kind}".encode() + marshal.dumps(code, WITHOUT_REFERENCES)
-    return told, sorted(set(_names(code)))
+    digest = f"{function.__module__} {kind}".encode() + marshal.dumps(code, WITHOUT_REFERENCES)
+    return digest, sorted(set(_names(code)))
 
 
 def _names(code: CodeType) -> Iterator[str]:

@@ -13,11 +13,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from distfsi.device.fold import Bound
 from distfsi.device.kernel import Kernel, Launch
+from distfsi.device.source import Bound
 
 TILE_CELLS = ((256,), (32, 8), (16, 8, 16))
-MOST_THREADS = 256
+MAXIMUM_THREADS = 256
 
 
 class Queue(Enum):
@@ -73,7 +73,7 @@ class Gpu:
     def __init__(self, runtime: Runtime, direct: bool = False):
         self.runtime, self.direct, self.seconds = runtime, direct, 0.0
         self._queue = Queue.MAIN
-        self._compiled: dict[tuple, Any] = {}
+        self._compiled: dict[tuple[object, ...], Any] = {}
 
     def with_own_clock(self) -> Gpu:
         """The same GPU, whose seconds are counted apart."""
@@ -82,12 +82,12 @@ class Gpu:
         return gpu
 
     def tile_cells(self, wanted: tuple[int, ...]) -> tuple[int, ...]:
-        fits = np.prod(wanted[:2]) <= MOST_THREADS  # one thread per column along the third axis
+        fits = np.prod(wanted[:2]) <= MAXIMUM_THREADS  # one thread per column along the third axis
         return wanted if fits else TILE_CELLS[len(wanted) - 1]
 
     def build(
         self,
-        drivers: Iterable[Callable],
+        drivers: Iterable[Callable[..., Any]],
         constants: Mapping[str, object],
         bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",
@@ -98,14 +98,14 @@ class Gpu:
     def run(self, kernel: Kernel, count: int, *arguments: Any) -> None:
         if not count:
             return
-        arguments = kernel.given(arguments)
-        if any(isinstance(argument, np.ndarray) for argument in arguments):
+        given = kernel.given(arguments)
+        if any(isinstance(argument, np.ndarray) for argument in given):
             raise TypeError(f"{kernel.name} gets an array of the host")
-        key = (id(kernel), *kernel.signature(arguments))
+        key = (id(kernel), *kernel.signature(given))
         if key not in self._compiled:
-            self._compiled[key] = self.runtime.compile(kernel, arguments), kernel.launch(arguments), kernel
+            self._compiled[key] = self.runtime.compile(kernel, given), kernel.launch(given), kernel
         compiled, launch, _ = self._compiled[key]
-        self.runtime.launch(compiled, launch, count, arguments, self._queue)
+        self.runtime.launch(compiled, launch, count, given, self._queue)
 
     run_few = run
 
@@ -167,4 +167,4 @@ class Gpu:
 
 
 def _lengths(shape: tuple[int, ...] | int) -> tuple[int, ...]:
-    return (int(shape),) if np.ndim(shape) == 0 else tuple(map(int, shape))
+    return tuple(map(int, shape)) if isinstance(shape, tuple) else (int(shape),)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,21 +44,21 @@ class HostKernel:
 
     def __init__(self, kernel: Kernel):
         self.kernel = kernel
-        self._compiled: dict[tuple, tuple[Callable, bool]] = {}
+        self._compiled: dict[tuple[object, ...], tuple[Callable[..., Any], bool]] = {}
 
     def __call__(self, count: int, arguments: Sequence[object], reverse: bool = False) -> None:
         """Run the items 0 … count with the arguments that the kernel is `given`; arrays are numpy arrays here."""
         key, launch = self.kernel.signature(arguments), self.kernel.launch(arguments)
         if key not in self._compiled:
             self._compiled[key] = self._compile(arguments)
-        values = [ctypes.c_longlong(0), ctypes.c_longlong(count)]
+        values: list[Any] = [ctypes.c_longlong(0), ctypes.c_longlong(count)]
         for argument in arguments:
             values += parameters_of(argument)
         pointers = (ctypes.c_void_p * len(values))(*(ctypes.addressof(value) for value in values))
         function, barriers = self._compiled[key]
         function(pointers, launch.blocks(count), launch.threads, launch.shared, barriers, reverse)
 
-    def _compile(self, arguments: Sequence[object]) -> tuple[Callable, bool]:
+    def _compile(self, arguments: Sequence[object]) -> tuple[Callable[..., Any], bool]:
         """The function that launches the kernel, and whether the kernel has barriers."""
         name = self.kernel.name
         text = f"{self.kernel.text(arguments)}\nHOST_LAUNCH({name})\n"
@@ -90,7 +91,7 @@ class HostArray:
         address, type_name = (self.memory.ctypes.data, False), self.memory.dtype.str
         return {"shape": self.shape, "typestr": type_name, "data": address, "version": 3}
 
-    def __array__(self, *_, **__) -> np.ndarray:
+    def __array__(self, *_: object, **__: object) -> np.ndarray:
         raise TypeError("an array of the device: get() it")
 
 
@@ -133,7 +134,7 @@ class HostRuntime:
     def compile(self, kernel: Kernel, arguments: Sequence[object]) -> HostKernel:
         return HostKernel(kernel)
 
-    def launch(self, compiled: HostKernel, launch: Launch, count: int, arguments: Sequence, queue: Queue) -> None:
+    def launch(self, compiled: HostKernel, launch: Launch, count: int, arguments: Sequence[Any], queue: Queue) -> None:
         values = [argument.memory if isinstance(argument, HostArray) else argument for argument in arguments]
         self._reverse = not self._reverse
         self._add(queue, partial(compiled, count, values, self._reverse))

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 
 
 class Device(Protocol):
@@ -34,7 +34,7 @@ class Device(Protocol):
 
     def build(
         self,
-        drivers: Iterable[Callable],
+        drivers: Iterable[Callable[..., Any]],
         constants: Mapping[str, object],
         bindings: Mapping[str, Bound | type] | None = None,
         real: str = "float64",

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from distfsi.device.cuda_text import THREADS, dtype_of, kernel_text, numbers_of, text_by_hand
 from distfsi.device.emit import Numbers
-from distfsi.device.fold import Bound, flat_values, parameters_of
 from distfsi.device.markers import ByHand
+from distfsi.device.source import Bound, flat_values, parameters_of
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class Launch:
 class Kernel:
     """A driver, what a scene fixes of it, and its real type; one text per signature it is called with."""
 
-    driver: Callable
+    driver: Callable[..., Any]
     constants: Mapping[str, object]
-    bindings: Mapping[str, Bound]
+    bindings: Mapping[str, Bound | type]
     real: str
 
     @property
@@ -61,7 +62,7 @@ class Kernel:
         numbers = self._by_hand.block(self.constants, self._named(arguments))
         return Launch(1, numbers["THREADS"], numbers["SHARED"] * np.dtype(self.real).itemsize)
 
-    def signature(self, arguments: Sequence[object]) -> tuple:
+    def signature(self, arguments: Sequence[object]) -> tuple[object, ...]:
         """What the text depends on: the type and the number of axes of each argument, and the launch."""
         kinds = ((str(dtype_of(argument)), getattr(argument, "ndim", 0)) for argument in arguments)
         return (*kinds, self.launch(arguments))

@@ -12,31 +12,26 @@ import ast
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
+from typing import Any
 
 from distfsi.device.emit import Emission
-from distfsi.device.fold import Bound, Source, stored_names
+from distfsi.device.llvm_expressions import Expressions
 from distfsi.device.llvm_types import (
-    BOOL,
     INTEGER,
     REALS,
-    Array,
     Function,
     Slot,
     Type,
     Value,
-    joined,
+    array_of,
     leaf_types,
-    number,
     packed_type,
-    parts_of,
 )
-from distfsi.device.llvm_values import DECLARED, Values, exponential
+from distfsi.device.llvm_values import DECLARED
+from distfsi.device.source import Bound, Source
+from distfsi.device.trees import called, name_of, stored_names
+from distfsi.narrowing import of_kind, present
 
-ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
-BITWISE = {ast.BitAnd: "and", ast.BitOr: "or", ast.LShift: "shl", ast.RShift: "ashr"}
-COMPARISONS = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 LOOPS = (ast.For, ast.While)
 
 
@@ -46,7 +41,7 @@ class Module:
 
     folded: Mapping[str, tuple[Source, ast.FunctionDef]]
     real: str
-    written: dict[tuple, Function] = field(default_factory=dict)
+    written: dict[tuple[object, ...], Function] = field(default_factory=dict)
     loops: int = 0
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -70,9 +65,9 @@ class Module:
 
 
 def module_of(
-    driver: Callable,
+    driver: Callable[..., Any],
     constants: Mapping[str, object],
-    bindings: Mapping[str, Bound],
+    bindings: Mapping[str, Bound | type],
     real: str,
     types: tuple[Type, ...],
 ) -> tuple[Module, Function]:
@@ -86,16 +81,13 @@ def module_of(
     return module, module.function(name, types)
 
 
-class Writer(Values):
+class Writer(Expressions):
     """Writes one folded function."""
 
     def __init__(self, module: Module, source: Source, tree: ast.FunctionDef):
-        super().__init__(source, module.real)
+        super().__init__(module, source)
         self.module, self.tree = module, tree
-        self.slots: list[str] = []  # what stands at the start of the function
-        self.scopes: list[dict[str, Value | Slot]] = []
         self.loops: list[tuple[str, str]] = []  # where `continue` and `break` go
-        self.owned: list[str] = []  # memory to free
         self.returns: Type | None = None
         self.returned = False
         branches = any(isinstance(node, (ast.If, *LOOPS)) for node in ast.walk(tree))
@@ -105,7 +97,8 @@ class Writer(Values):
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
         """The function as `name`, for arguments of such types."""
         self.scopes = [{}]
-        parameters, alias = [], "noalias " if self.source.kind == "row" else ""
+        parameters: list[str] = []
+        alias = "noalias " if self.source.kind == "row" else ""
         for argument, kind in zip(self.tree.args.args, types, strict=True):
             leaves = [f"%p{len(parameters) + k}" for k in range(len(leaf_types(kind)))]
             for leaf, leaf_kind in zip(leaves, leaf_types(kind), strict=True):
@@ -118,38 +111,29 @@ class Writer(Values):
             self.give_back(None)
         inlined = " alwaysinline" if self.source.kind in ("formula", "helper") else ""
         head = f"define internal {packed_type(self.returns)} @{name}({', '.join(parameters)}) nounwind{inlined} {{"
-        text = "\n".join([f"; {self.source.place}", head, "entry:", *self.slots, *self.lines, "}", ""])
+        text = "\n".join([f"; {self.source.location}", head, "entry:", *self.slots, *self.lines, "}", ""])
         return Function(name, self.returns, text)
 
     # ---- names -------------------------------------------------------------------------------------------------------
-
-    def found(self, name: str) -> Value | Slot | None:
-        return next((scope[name] for scope in reversed(self.scopes) if name in scope), None)
 
     def assign(self, name: str, value: Value) -> None:
         """Give a name a value; the first assignment in reach declares it."""
         if name not in self.changing:
             self.scopes[-1][name] = value
             return
-        place = self.found(name)
-        if place is None:
+        variable = self.found(name)
+        if variable is None:
             addresses = [f"%{self.name('s')}" for _ in value.leaves]
             pairs = zip(addresses, leaf_types(value.type), strict=True)
             self.slots += [f"  {address} = alloca {kind}" for address, kind in pairs]
-            place = self.scopes[-1][name] = Slot(value.type, tuple(addresses))
-        if isinstance(place, Value):
+            variable = self.scopes[-1][name] = Slot(value.type, tuple(addresses))
+        if isinstance(variable, Value):
             raise self.refuse(f"{name} runs over a range, but gets another value")
-        if self.common(place.type, value.type) != place.type:
+        if self.common(variable.type, value.type) != variable.type:
             raise self.refuse(f"{name} gets a value of another type")
-        value = self.converted(value, place.type)
-        for kind, leaf, address in zip(leaf_types(place.type), value.leaves, place.addresses, strict=True):
+        value = self.converted(value, variable.type)
+        for kind, leaf, address in zip(leaf_types(variable.type), value.leaves, variable.addresses, strict=True):
             self.line(f"store {kind} {leaf}, ptr {address}")
-
-    def truth(self, node: ast.expr) -> str:
-        return self.scalar(self.value(node), BOOL)
-
-    def integer(self, node: ast.expr) -> str:
-        return self.scalar(self.value(node), INTEGER)
 
     # ---- statements --------------------------------------------------------------------------------------------------
 
@@ -159,7 +143,7 @@ class Writer(Values):
                 return
             getattr(self, f"write_{type(statement).__name__.lower()}")(statement)
 
-    def nested(self, body: Sequence[ast.stmt], **names: Value) -> None:
+    def nested(self, body: Sequence[ast.stmt], **names: Value | Slot) -> None:
         self.scopes.append(names)
         self.statements(body)
         self.scopes.pop()
@@ -184,14 +168,14 @@ class Writer(Values):
         if kind != self.returns:
             if kind is None or self.returns is None or self.common(kind, self.returns) != self.returns:
                 raise self.refuse("its values have several types; the first one must be the widest")
-            value = self.converted(value, self.returns)
+            value = self.converted(present(value), self.returns)
         self.give_back(value)
 
     def give_back(self, value: Value | None) -> None:
         for memory in self.owned:
             self.line(f"call void @free(ptr {memory})")
         leaves, packed = () if value is None else value.leaves, packed_type(self.returns)
-        if len(leaves) > 1:
+        if value is not None and len(leaves) > 1:
             whole = "poison"
             for k, (kind, leaf) in enumerate(zip(leaf_types(value.type), leaves, strict=True)):
                 whole = self.new(f"insertvalue {packed} {whole}, {kind} {leaf}, {k}")
@@ -213,8 +197,9 @@ class Writer(Values):
             for k, part in enumerate(target.elts):
                 self.store(part, self.item(value, k))
         else:
-            array = self.value(target.value)
-            self.put(array.type.element, self.address(array, self.places(target.slice)), value)
+            item = of_kind(ast.Subscript, target)
+            array = self.value(item.value)
+            self.put(array_of(array).element, self.address(array, self.indices(item.slice)), value)
 
     def write_if(self, node: ast.If) -> None:
         yes, no, after = self.name("yes"), self.name("no"), self.name("after")
@@ -244,7 +229,7 @@ class Writer(Values):
         self.start(after)
 
     def write_for(self, node: ast.For) -> None:
-        if not (isinstance(node.iter, ast.Call) and node.iter.func.id == "range"):
+        if not (isinstance(node.iter, ast.Call) and called(node.iter) == "range"):
             raise self.refuse("loops run over a range")
         bounds, step = [self.integer(bound) for bound in node.iter.args], "1"
         if len(bounds) == 3:
@@ -260,7 +245,7 @@ class Writer(Values):
         self.branch(self.new(f"icmp {'sgt' if step[0] == '-' else 'slt'} i64 {i}, {end}"), body, after)
         self.start(body)
         self.loops.append((next_, after))
-        self.nested(node.body, **{node.target.id: Value(INTEGER, (i,))})
+        self.nested(node.body, **{name_of(node.target): Value(INTEGER, (i,))})
         self.loops.pop()
         self.go(next_)
         self.start(next_)
@@ -268,131 +253,3 @@ class Writer(Values):
         mark = f", !llvm.loop {self.module.loop()}" if self.source.kind == "row" else ""
         self.line(f"br label %{head}{mark}")
         self.start(after)
-
-    # ---- expressions -------------------------------------------------------------------------------------------------
-
-    def value(self, node: ast.expr) -> Value:
-        method = getattr(self, f"value_of_{type(node).__name__.lower()}", None)
-        if method is None:
-            raise self.refuse(f"{type(node).__name__} has no meaning")
-        return method(node)
-
-    def value_of_constant(self, node: ast.Constant) -> Value:
-        if isinstance(node.value, bool):
-            return Value(BOOL, ("true" if node.value else "false",))
-        if isinstance(node.value, int):
-            return Value(INTEGER, (str(node.value),))
-        return Value(self.real, (number(node.value, self.real),))
-
-    def value_of_name(self, node: ast.Name) -> Value:
-        place = self.found(node.id)
-        if place is None:
-            raise self.refuse(f"{node.id} has a value only inside a branch or loop; give it one before")
-        if isinstance(place, Value):
-            return place
-        pairs = zip(leaf_types(place.type), place.addresses, strict=True)
-        return Value(place.type, tuple(self.new(f"load {kind}, ptr {address}") for kind, address in pairs))
-
-    def value_of_tuple(self, node: ast.Tuple) -> Value:
-        return joined([self.value(item) for item in node.elts])
-
-    def value_of_binop(self, node: ast.BinOp) -> Value:
-        a, b, operator = self.value(node.left), self.value(node.right), type(node.op)
-        if operator in BITWISE and a.type == b.type == BOOL:
-            return Value(BOOL, (self.new(f"{BITWISE[operator]} i1 {a.leaves[0]}, {b.leaves[0]}"),))
-        kind = INTEGER if a.type == b.type == BOOL else self.common(a.type, b.type)
-        if operator is ast.Div and kind == INTEGER:
-            kind = "double"
-        x, y = self.scalar(a, kind), self.scalar(b, kind)
-        if kind != INTEGER:
-            word = "fdiv" if operator is ast.Div else f"f{ARITHMETIC[operator]}"
-            return Value(kind, (self.new(f"{word} {kind} {x}, {y}"),))
-        if operator in (ast.FloorDiv, ast.Mod):
-            return Value(kind, (self.floored(operator, x, y),))
-        return Value(kind, (self.new(f"{(ARITHMETIC | BITWISE)[operator]} i64 {x}, {y}"),))
-
-    def floored(self, operator: type, x: str, y: str) -> str:
-        """Python's quotient or rest of two integers."""
-        rest = self.new(f"srem i64 {x}, {y}")
-        other_sign = self.new(f"icmp slt i64 {self.new(f'xor i64 {rest}, {y}')}, 0")
-        off = self.new(f"and i1 {self.new(f'icmp ne i64 {rest}, 0')}, {other_sign}")
-        if operator is ast.Mod:
-            return self.new(f"add i64 {rest}, {self.new(f'select i1 {off}, i64 {y}, i64 0')}")
-        return self.new(f"add i64 {self.new(f'sdiv i64 {x}, {y}')}, {self.new(f'sext i1 {off} to i64')}")
-
-    def value_of_compare(self, node: ast.Compare) -> Value:
-        a, b = self.value(node.left), self.value(node.comparators[0])
-        return Value(BOOL, (self.compared(COMPARISONS[type(node.ops[0])], a, b),))
-
-    def value_of_unaryop(self, node: ast.UnaryOp) -> Value:
-        if isinstance(node.op, ast.Not):
-            return Value(BOOL, (self.new(f"xor i1 {self.truth(node.operand)}, true"),))
-        value = self.value(node.operand)
-        kind = INTEGER if value.type == BOOL else value.type
-        x = self.scalar(value, kind)
-        return Value(kind, (self.new(f"sub i64 0, {x}" if kind == INTEGER else f"fneg {kind} {x}"),))
-
-    def value_of_boolop(self, node: ast.BoolOp) -> Value:
-        *others, last = node.values
-        stop = isinstance(node.op, ast.Or)
-        if not others:
-            return Value(BOOL, (self.truth(last),))
-        first = self.value_of_boolop(ast.BoolOp(node.op, others)).leaves[0]
-        known = Value(BOOL, ("true" if stop else "false",))
-        then, orelse = (lambda: known), (lambda: Value(BOOL, (self.truth(last),)))
-        return self.chosen(first, *((then, orelse) if stop else (orelse, then)))
-
-    def value_of_ifexp(self, node: ast.IfExp) -> Value:
-        return self.chosen(self.truth(node.test), lambda: self.value(node.body), lambda: self.value(node.orelse))
-
-    def value_of_attribute(self, node: ast.Attribute) -> Value:
-        lengths = self.value(node.value).leaves[1:]
-        if node.attr == "shape":
-            return Value((INTEGER,) * len(lengths), lengths)
-        size, *others = lengths
-        for length in others:
-            size = self.new(f"mul i64 {size}, {length}")
-        return Value(INTEGER, (size,))
-
-    def value_of_subscript(self, node: ast.Subscript) -> Value:
-        whole = self.value(node.value)
-        if isinstance(whole.type, Array):
-            return self.get(whole, self.places(node.slice))
-        if isinstance(node.slice, ast.Constant):
-            return self.item(whole, node.slice.value)
-        *others, chosen = parts_of(whole)
-        place = self.integer(node.slice)
-        for k, part in reversed(list(enumerate(others))):
-            chosen = self.selected(self.new(f"icmp eq i64 {place}, {k}"), part, self.converted(chosen, part.type))
-        return chosen
-
-    def places(self, node: ast.expr) -> list[str]:
-        return [self.integer(place) for place in (node.elts if isinstance(node, ast.Tuple) else [node])]
-
-    def value_of_call(self, node: ast.Call) -> Value:
-        values = [self.value(argument) for argument in node.args]
-        word = getattr(self, f"word_{node.func.id}", None)
-        if word is not None:
-            return word(*values)
-        function = self.module.function(node.func.id, tuple(value.type for value in values))
-        return self.called(function, values)
-
-    def word_workspace(self, n: Value) -> Value:
-        element, length = "float64" if self.real == "double" else "float32", self.scalar(n, INTEGER)
-        if length.isdigit():
-            memory = f"%{self.name('w')}"
-            self.slots.append(f"  {memory} = alloca [{length} x {self.real}], align 64")
-        else:
-            if len(self.scopes) > 1:
-                raise self.refuse("a workspace of any size stands outside of branches and loops")
-            size = self.new(f"mul i64 {length}, {np.dtype(element).itemsize}")
-            memory = self.new(f"call ptr @malloc(i64 {size})")
-            self.owned.append(memory)
-        return Value(Array(element, 1), (memory, length))
-
-    def word_exp(self, x: Value) -> Value:
-        """The exponential in arithmetic that vectorises (device/exponential.py)."""
-        key = ("exp", self.real)
-        if key not in self.module.written:
-            self.module.written[key] = exponential(self.real)
-        return self.called(self.module.written[key], [self.converted(x, self.real)])

@@ -9,9 +9,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+
+from distfsi.narrowing import of_kind
 
 INTEGER, SHORT, BOOL = "i64", "i32", "i1"  # SHORT: counts in loops that must vectorise
 REALS = {"float64": "double", "float32": "float"}
@@ -27,7 +29,7 @@ class Array:
     axes: int
 
 
-Type = str | Array | tuple
+Type: TypeAlias = "str | Array | tuple[Type, ...]"
 
 
 class Value(NamedTuple):
@@ -59,6 +61,11 @@ def type_of(argument: object) -> Type:
     return kind
 
 
+def array_of(value: Value) -> Array:
+    """The type of a value that is an array."""
+    return of_kind(Array, value.type)
+
+
 def leaf_types(kind: Type) -> list[str]:
     """The LLVM types of a type's leaves."""
     if isinstance(kind, Array):
@@ -77,7 +84,7 @@ def packed_type(kind: Type | None) -> str:
 def parts_of(value: Value) -> list[Value]:
     """The parts of a tuple."""
     parts, start = [], 0
-    for kind in value.type:
+    for kind in of_kind(tuple, value.type):
         end = start + len(leaf_types(kind))
         parts.append(Value(kind, value.leaves[start:end]))
         start = end

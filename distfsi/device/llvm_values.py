@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from distfsi.device.exponential import EXPONENTIALS
-from distfsi.device.fold import NotInSubset, Source
 from distfsi.device.llvm_types import (
     BOOL,
     INTEGER,
@@ -17,12 +16,15 @@ from distfsi.device.llvm_types import (
     Function,
     Type,
     Value,
+    array_of,
     joined,
     leaf_types,
     number,
     packed_type,
     parts_of,
 )
+from distfsi.device.source import NotInSubset, Source
+from distfsi.narrowing import of_kind
 
 # what modules may call; `fabs` and `abs` are those of reals and integers
 DECLARED = [f"declare double @llvm.{word}.f64(double)" for word in ("sqrt", "log", "fabs", "floor")]
@@ -40,7 +42,7 @@ class Values:
         self.block, self.ended, self.count = "entry", False, 0
 
     def refuse(self, why: str) -> NotInSubset:
-        return NotInSubset(f"{self.source.place}, {self.source.function.__name__}: {why}")
+        return NotInSubset(f"{self.source.location}, {self.source.function.__name__}: {why}")
 
     # ---- text --------------------------------------------------------------------------------------------------------
 
@@ -98,7 +100,7 @@ class Values:
         if isinstance(kind, tuple):
             pairs = zip(parts_of(value), kind, strict=True)
             return joined([self.converted(part, part_kind) for part, part_kind in pairs])
-        return Value(kind, (self.cast(value.leaves[0], value.type, kind),))
+        return Value(kind, (self.scalar(value, of_kind(str, kind)),))
 
     def cast(self, leaf: str, old: str, new: str) -> str:
         if old == new:
@@ -157,7 +159,7 @@ class Values:
         return Value(a.type, tuple(leaves))
 
     def compared(self, word: str, a: Value, b: Value) -> str:
-        kind = self.common(a.type, b.type)
+        kind = of_kind(str, self.common(a.type, b.type))
         x, y = self.scalar(a, kind), self.scalar(b, kind)
         if kind in (BOOL, SHORT, INTEGER):
             return self.new(f"icmp {word if word in ('eq', 'ne') else 's' + word} {kind} {x}, {y}")
@@ -173,21 +175,21 @@ class Values:
     def item(self, whole: Value, k: int) -> Value:
         return self.get(whole, [str(k)]) if isinstance(whole.type, Array) else parts_of(whole)[k]
 
-    def address(self, array: Value, places: Sequence[str]) -> str:
+    def address(self, array: Value, indices: Sequence[str]) -> str:
         data, *lengths = array.leaves
-        flat = places[0]
-        for place, length in zip([*places[1:], *["0"] * (len(lengths) - len(places))], lengths[1:], strict=True):
+        flat = indices[0]
+        for index, length in zip([*indices[1:], *["0"] * (len(lengths) - len(indices))], lengths[1:], strict=True):
             flat = self.new(f"mul i64 {flat}, {length}")
-            flat = flat if place == "0" else self.new(f"add i64 {flat}, {place}")
-        return self.new(f"getelementptr inbounds {STORED[array.type.element]}, ptr {data}, i64 {flat}")
+            flat = flat if index == "0" else self.new(f"add i64 {flat}, {index}")
+        return self.new(f"getelementptr inbounds {STORED[array_of(array).element]}, ptr {data}, i64 {flat}")
 
-    def get(self, array: Value, places: Sequence[str]) -> Value:
-        """A value of an array, or with fewer places than axes the array of the rest."""
-        element, axes = array.type.element, array.type.axes
-        if len(places) < axes:
-            rest = array.leaves[1 + len(places) :]
-            return Value(Array(element, axes - len(places)), (self.address(array, places), *rest))
-        return self.loaded(element, self.address(array, places))
+    def get(self, array: Value, indices: Sequence[str]) -> Value:
+        """A value of an array, or with fewer indices than axes the array of the rest."""
+        element, axes = array_of(array).element, array_of(array).axes
+        if len(indices) < axes:
+            rest = array.leaves[1 + len(indices) :]
+            return Value(Array(element, axes - len(indices)), (self.address(array, indices), *rest))
+        return self.loaded(element, self.address(array, indices))
 
     def loaded(self, element: str, address: str) -> Value:
         stored = STORED[element]
@@ -209,9 +211,9 @@ class Values:
             leaf = leaf if stored == INTEGER else self.new(f"trunc i64 {leaf} to {stored}")
         self.line(f"store {stored} {leaf}, ptr {address}")
 
-    def flat_address(self, array: Value, place: Value) -> str:
-        stored = STORED[array.type.element]
-        return self.new(f"getelementptr inbounds {stored}, ptr {array.leaves[0]}, i64 {self.scalar(place, INTEGER)}")
+    def flat_address(self, array: Value, index: Value) -> str:
+        stored = STORED[array_of(array).element]
+        return self.new(f"getelementptr inbounds {stored}, ptr {array.leaves[0]}, i64 {self.scalar(index, INTEGER)}")
 
     # ---- arithmetic and calls ----------------------------------------------------------------------------------------
 
@@ -223,16 +225,17 @@ class Values:
         if packed == "void":
             self.line(call)
             return Value((), ())
-        result, count = self.new(call), len(leaf_types(function.returns))
+        returns: Type = () if function.returns is None else function.returns
+        result, count = self.new(call), len(leaf_types(returns))
         leaves = [result] if count == 1 else [self.new(f"extractvalue {packed} {result}, {k}") for k in range(count)]
-        return Value(function.returns, tuple(leaves))
+        return Value(returns, tuple(leaves))
 
     def mathematics(self, word: str, *values: Value) -> Value:
         """A function of reals that LLVM knows."""
         kind = values[0].type
         for value in values[1:]:
             kind = self.common(kind, value.type)
-        kind = "double" if kind in (BOOL, INTEGER) else kind
+        kind = "double" if kind in (BOOL, INTEGER) else of_kind(str, kind)
         operands = ", ".join(f"{kind} {self.scalar(value, kind)}" for value in values)
         return Value(kind, (self.new(f"call {kind} @llvm.{word}.{'f64' if kind == 'double' else 'f32'}({operands})"),))
 
@@ -273,11 +276,11 @@ class Values:
     def word_len(self, array: Value) -> Value:
         return Value(INTEGER, array.leaves[1:2])
 
-    def word_load(self, array: Value, place: Value) -> Value:
-        return self.loaded(array.type.element, self.flat_address(array, place))
+    def word_load(self, array: Value, index: Value) -> Value:
+        return self.loaded(array_of(array).element, self.flat_address(array, index))
 
-    def word_store(self, array: Value, place: Value, value: Value) -> Value:
-        self.put(array.type.element, self.flat_address(array, place), value)
+    def word_store(self, array: Value, index: Value, value: Value) -> Value:
+        self.put(array_of(array).element, self.flat_address(array, index), value)
         return Value((), ())
 
 
@@ -285,7 +288,7 @@ def exponential(real: str) -> Function:
     """exp(x), with the same bits on every device."""
     numbers = EXPONENTIALS["float64" if real == "double" else "float32"]
     bits, bias = (64, 1023) if real == "double" else (32, 127)
-    lines = []
+    lines: list[str] = []
 
     def new(text: str) -> str:
         lines.append(f"  %t{len(lines)} = {text}")

@@ -4,10 +4,13 @@ The words have plain Python meanings here, so that a kernel can be read, linted 
 `device/cpu.py` gives them their fast meanings.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -22,37 +25,38 @@ class ByHand:
 
     file: str
     formulas: Sequence[str]
-    block: Callable[[dict, dict], dict[str, int]]
+    block: Callable[[Mapping[str, object], Mapping[str, object]], dict[str, int]]
 
-    def __call__(self, driver):
-        driver.__by_hand__ = self
-        return driver
+    def __call__(self, driver: Kernel) -> Kernel:
+        return _marked(driver, "__by_hand__", self)
 
 
-def row(function):
+def _marked(function: Kernel, name: str, mark: object) -> Kernel:
+    setattr(function, name, mark)
+    return function
+
+
+def row(function: Kernel) -> Kernel:
     """An inner loop that must vectorise: no two array arguments alias, all indexing by load/store."""
-    function.__kind__ = "row"
-    return function
+    return _marked(function, "__kind__", "row")
 
 
-def driver(function):
+def driver(function: Kernel) -> Kernel:
     """A function called from Python: releases the GIL, is cached on disk, calls rows and formulas."""
-    function.__kind__ = "driver"
-    return function
+    return _marked(function, "__kind__", "driver")
 
 
-def helper(function):
+def helper(function: Kernel) -> Kernel:
     """A function that drivers and rows call, inlined; integers and arrays allowed."""
-    function.__kind__ = "helper"
-    return function
+    return _marked(function, "__kind__", "helper")
 
 
-def load(A, i):
+def load(A: np.ndarray, i: int) -> Any:
     """A.flat[i] with no wrap-around and no bounds check."""
     return A.flat[i]
 
 
-def store(A, i, x):
+def store(A: np.ndarray, i: int, x: Any) -> None:
     """A.flat[i] = x with no wrap-around and no bounds check."""
     A.flat[i] = x
 
@@ -61,6 +65,6 @@ real = float  # in a kernel: the scene's precision
 int32 = int  # a count in a loop that must vectorise: one of 64 bits would halve how many float32 are packed
 
 
-def workspace(n):
+def workspace(n: int) -> np.ndarray:
     """n uninitialised reals that live as long as the driver call."""
     return np.empty(n)

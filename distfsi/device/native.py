@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.cache import cache_directory, file_name, locked, write_whole
-from distfsi.device.emit import Emission, Numbers, callees_first
+from distfsi.device.emit import Emission, Numbers, callees_first, given_numbers
 from distfsi.device.fingerprint import fingerprint, texts_depend_on
-from distfsi.device.fold import Bound, flat_values, given_numbers
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
+from distfsi.device.source import Bound, flat_values
 from distfsi.narrowing import present
 
 
@@ -46,7 +46,7 @@ class Compilation:
             self._listener(self.made)
 
     @contextmanager
-    def told(self, listener: Callable[[int], None]) -> Iterator[None]:
+    def announced(self, listener: Callable[[int], None]) -> Iterator[None]:
         """Meanwhile `listener` gets the number of each driver that is about to be compiled."""
         self._listener = listener
         try:
@@ -63,7 +63,11 @@ class Native:
     compiles it for each list of types that it is called with."""
 
     def __init__(
-        self, driver: Callable[..., Any], constants: Mapping[str, object], bindings: Mapping[str, Bound], real: str
+        self,
+        driver: Callable[..., Any],
+        constants: Mapping[str, object],
+        bindings: Mapping[str, Bound | type],
+        real: str,
     ):
         self.driver, self.constants, self.bindings, self.real = driver, constants, bindings, real
         self._compiled = False
@@ -129,13 +133,13 @@ class Native:
         emission = Emission(self.constants, self.bindings)
         root = emission.root(self.driver)
         functions = callees_first(emission.functions)
-        told = hashlib.sha256(texts_depend_on() + self.real.encode())
+        digest = hashlib.sha256(texts_depend_on() + self.real.encode())
         for source, tree in functions:
-            told.update(f"{source.kind} {ast.unparse(tree)}\n".encode())
-        name = file_name(self.driver.__name__, told.hexdigest())
+            digest.update(f"{source.kind} {ast.unparse(tree)}\n".encode())
+        name = file_name(self.driver.__name__, digest.hexdigest())
         parameters = ", ".join(argument.arg for argument in emission.functions[root][1].args.args)
         lines = [
-            f"# {functions[-1][0].place}",
+            f"# {functions[-1][0].location}",
             "from distfsi.device.runtime import body_of, driver",
             "",
             f"NUMBERS = {tuple(emission.numbers)!r}",

@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import tempfile
 from collections import Counter
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def candidates() -> list[str]:
     """Where the library may be, packages of Python first."""
     found: list[Path] = []
     spec = importlib.util.find_spec("nvidia")
-    for root in spec.submodule_search_locations if spec else ():
+    for root in (spec.submodule_search_locations if spec else None) or ():
         found += sorted(Path(root).glob("*/lib/libnvrtc.so.*"), reverse=True)
     cuda = os.environ.get("CUDA_PATH", "/usr/local/cuda")
     found += sorted(Path(cuda).glob("lib64/libnvrtc.so*"))
@@ -73,7 +74,7 @@ def compile_text(text: str, architecture: str) -> tuple[bytes, str]:
     return code, log
 
 
-def _taken(size_of, take, program: ctypes.c_void_p) -> bytes:
+def _taken(size_of: Callable[..., int], take: Callable[..., int], program: ctypes.c_void_p) -> bytes:
     size = ctypes.c_size_t()
     size_of(program, ctypes.byref(size))
     buffer = ctypes.create_string_buffer(size.value)
@@ -122,7 +123,7 @@ def instructions(code: bytes) -> dict[str, int]:
 
 def _disassembler() -> str:
     spec = importlib.util.find_spec("nvidia")
-    for root in spec.submodule_search_locations if spec else ():
+    for root in (spec.submodule_search_locations if spec else None) or ():
         for path in Path(root).glob("*/bin/nvdisasm"):
             return str(path)
     found = shutil.which("nvdisasm")

@@ -18,13 +18,16 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from distfsi.device.llvm_types import BOOL, INTEGER, REALS, SHORT, Array, Type, leaf_types
+from distfsi.narrowing import of_kind
 
 VERSION = "1"
 WRITERS: dict[str, Callable[[tuple[Type, ...]], tuple[str, str, Type | None]]] = {}
 
-driver = njit(error_model="numpy", nogil=True, cache=True, no_cfunc_wrapper=True)
+driver: Callable[[Callable[..., Any]], Any] = njit(  # type: ignore[call-overload] # numba has more words than its types
+    error_model="numpy", nogil=True, cache=True, no_cfunc_wrapper=True
+)
 
-_NUMBERS = {
+_NUMBERS: dict[str, types.Type] = {
     INTEGER: types.int64,
     SHORT: types.int32,
     BOOL: types.boolean,
@@ -35,16 +38,16 @@ _LEAVES = {"ptr": ir.PointerType(), INTEGER: ir.IntType(64), SHORT: ir.IntType(3
 _LEAVES |= {"double": ir.DoubleType(), "float": ir.FloatType()}
 
 
-def body_of(module: str) -> Callable:
+def body_of(module: str) -> Callable[..., Any]:
     """The body of a driver, to be called with all its arguments in one tuple: `WRITERS[module]` gives for their types
     the name of a function, the text that defines it, and the type that it returns."""
 
     @intrinsic
-    def body(typing_context, arguments):
+    def body(typing_context: Any, arguments: Any) -> Any:
         name, text, returns = WRITERS[module](tuple(map(_type_of, arguments.types)))
 
-        def code(context, builder, signature, given):
-            leaves = []
+        def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            leaves: list[Any] = []
             for k, kind in enumerate(arguments.types):
                 leaves += _leaves(context, builder, kind, builder.extract_value(given[0], k))
             context.active_code_library.add_linking_library(_Written(text, context.codegen()))
@@ -62,11 +65,16 @@ def body_of(module: str) -> Callable:
     return body
 
 
-def _whole(context, builder, kind: types.Type, leaves: Iterator[ir.Value]) -> ir.Value:
+def _whole(context: Any, builder: Any, kind: types.Type, leaves: Iterator[ir.Value]) -> ir.Value:
     """A value of numba made of its leaves, tuples in it one behind the other."""
     if not isinstance(kind, types.BaseTuple):
         return next(leaves)
-    return context.make_tuple(builder, kind, [_whole(context, builder, part, leaves) for part in kind.types])
+    return context.make_tuple(builder, kind, [_whole(context, builder, part, leaves) for part in _parts(kind)])
+
+
+def _parts(kind: Any) -> Sequence[types.Type]:
+    """The types in a tuple of numba's."""
+    return kind.types
 
 
 class _Written:
@@ -91,7 +99,7 @@ def _type_of(kind: types.Type) -> Type:
             raise TypingError("kernels take contiguous arrays")
         return Array(str(kind.dtype) if kind.dtype is not types.boolean else "bool", kind.ndim)
     if isinstance(kind, types.BaseTuple):
-        return tuple(map(_type_of, kind.types))
+        return tuple(map(_type_of, _parts(kind)))
     if isinstance(kind, types.Integer):
         return INTEGER
     if isinstance(kind, types.Boolean):
@@ -105,7 +113,9 @@ def _numba_type(kind: Type | None) -> types.Type:
     """The type of numba of what a driver returns."""
     if kind is None:
         return types.none
-    return types.Tuple([_numba_type(part) for part in kind]) if isinstance(kind, tuple) else _NUMBERS[kind]
+    return (
+        types.Tuple([_numba_type(part) for part in kind]) if isinstance(kind, tuple) else _NUMBERS[of_kind(str, kind)]
+    )
 
 
 def _leaves(context: Any, builder: Any, kind: types.Type, value: Any) -> Sequence[Any]:
@@ -114,9 +124,9 @@ def _leaves(context: Any, builder: Any, kind: types.Type, value: Any) -> Sequenc
         array = context.make_array(kind)(context, builder, value)
         return [array.data, *cgutils.unpack_tuple(builder, array.shape, kind.ndim)]
     if isinstance(kind, types.BaseTuple):
-        parts = [builder.extract_value(value, k) for k in range(len(kind.types))]
+        parts = [builder.extract_value(value, k) for k in range(len(_parts(kind)))]
         return [
-            leaf for part, own in zip(parts, kind.types, strict=True) for leaf in _leaves(context, builder, own, part)
+            leaf for part, own in zip(parts, _parts(kind), strict=True) for leaf in _leaves(context, builder, own, part)
         ]
     if isinstance(kind, types.Integer):
         return [context.cast(builder, value, kind, types.int64)]

@@ -5,8 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from distfsi.coupling.protocol import Coupling
+from distfsi.diagnostics.watched import Watched
+from distfsi.fluid.fluid import Fluid
 from distfsi.gauges import per_extent
 from distfsi.mesh.blocks import Snapshot
+from distfsi.narrowing import present
+from distfsi.solid.solid import Solid
 
 AXES = "xyz"
 SLOW = 1e-3  # of the speed of sound: where all is slower, errors of the momentum are measured by this speed
@@ -19,10 +24,9 @@ class Budget:
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """
 
-    def __init__(self, fluid, solid, coupling):
+    def __init__(self, fluid: Fluid | None, solid: Solid | None, coupling: Coupling | None):
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
-        part = fluid or solid
-        self.dimensions = part.blocks.grid.dimensions
+        self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
         self._kg, impulse, self._joule = (per_extent(unit, self.dimensions) for unit in ("kg", "N s", "J"))
         self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
@@ -52,7 +56,7 @@ class Budget:
             self.columns += [f"coupling {cause} {name}" for cause in self._created for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names]
 
-    def row(self, simulation) -> dict[str, float | int | str]:
+    def row(self, simulation: Watched) -> dict[str, float | int | str]:
         """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far; of the
         momentum at least to that of a slow motion."""
         masses = self.phases
@@ -79,15 +83,15 @@ class Budget:
             if self.fluid.force:
                 add("body force", self.fluid.force.totals(), -1.0)
         if self.solid:
-            totals = self.solid.totals()
-            amounts = np.array([*[0.0] * masses, *totals["momentum"], totals["kinetic"] + totals["internal"]])
+            held = self.solid.totals()
+            amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])
             magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
-            magnitude[masses:-1] = np.sqrt(2.0 * totals["mass"] * totals["kinetic"]) + SLOW * totals["acoustic"]
+            magnitude[masses:-1] = np.sqrt(2.0 * held["mass"] * held["kinetic"]) + SLOW * held["acoustic"]
             balance, size = balance + amounts, size + magnitude
-            values[f"solid mass [{self._kg}]"] = totals["mass"]
-            values |= {f"solid {name}": m for name, m in zip(self._momentum, totals["momentum"], strict=True)}
-            values[f"solid kinetic energy [{self._joule}]"] = totals["kinetic"]
-            values[f"solid internal energy [{self._joule}]"] = totals["internal"]
+            values[f"solid mass [{self._kg}]"] = float(held["mass"])
+            values |= {f"solid {name}": m for name, m in zip(self._momentum, held["momentum"], strict=True)}
+            values[f"solid kinetic energy [{self._joule}]"] = float(held["kinetic"])
+            values[f"solid internal energy [{self._joule}]"] = float(held["internal"])
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
@@ -116,13 +120,13 @@ class Budget:
         """Go on from a snapshot."""
         self._start, self._scale = snapshot["values"]["start"], snapshot["values"]["scale"]
 
-    def summary(self, simulation) -> str:
+    def summary(self, simulation: Watched) -> str:
         """Collective. One sentence on the conservation error, and on what the coupling has created."""
         row = self.row(simulation)
-        worst = max(abs(row[f"drift {name}"]) for name in self._names)
+        worst = max(abs(float(row[f"drift {name}"])) for name in self._names)
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(row[f"coupling {cause} {self.conserved[-1]}"] for cause in self._created)
+            energy = sum(float(row[f"coupling {cause} {self.conserved[-1]}"]) for cause in self._created)
             share = 100 * energy / self._scale[-1]
             text += f" The coupling created {energy:.4g} {self._joule} ({share:.2g} % of the energy)."
         return text

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from distfsi.diagnostics.sampling import FluidSampler
+from distfsi.diagnostics.watched import Watched
 from distfsi.gauges import Gauge, Layer, LayerProbe, Particles, TableProbe
 from distfsi.mesh.blocks import Snapshot
 from distfsi.mesh.communicator import Communicator
@@ -23,7 +23,7 @@ from distfsi.output.storage import Storage, storage
 class SampledRun:
     """A simulation as gauges see it (gauges.Run)."""
 
-    def __init__(self, simulation: Any):
+    def __init__(self, simulation: Watched):
         self._simulation = simulation
         self.communicator, self.blocks = simulation.communicator, simulation.blocks
         solid = simulation.scene.solid
@@ -49,11 +49,11 @@ class SampledRun:
         return present(self._simulation.solid)
 
     def fluid_points(self, positions: np.ndarray) -> FluidSampler:
-        return FluidSampler(self._simulation.fluid, self._simulation.coupling, positions)
+        return FluidSampler(present(self._simulation.fluid), self._simulation.coupling, positions)
 
     def fluid_fields(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
         coupling = self._simulation.coupling
-        return self._simulation.fluid.outputs(coupling.covered if coupling else None, chosen)
+        return present(self._simulation.fluid).outputs(coupling.covered if coupling else None, chosen)
 
 
 class TableFile:
@@ -116,7 +116,7 @@ class LayerAndTable(LayerFiles):
 class GaugeRecorder:
     """Samples a run at the first step at or after each multiple of its interval; the samples are in files at once."""
 
-    def __init__(self, name: str, gauge: Gauge, simulation: Any):
+    def __init__(self, name: str, gauge: Gauge, simulation: Watched):
         """Collective, when the simulation has not begun."""
         self.name = f"gauge {name}"
         self._run = SampledRun(simulation)
@@ -131,7 +131,7 @@ class GaugeRecorder:
         interval = gauge.interval(simulation.scene.time.end)
         self._each_step, self._schedule, self._last = interval == 0.0, Every(interval), 0.0
 
-    def after_step(self, simulation: Any) -> None:
+    def after_step(self, simulation: Watched) -> None:
         """Collective. Sample the state after a step, or the one at the start, if it is time."""
         self._probe.see(self._run)
         if self._each_step or self._schedule.due(simulation.time):

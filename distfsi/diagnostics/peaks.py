@@ -10,6 +10,7 @@ from distfsi.coupling.protocol import Coupling
 from distfsi.device.interface import DualArray
 from distfsi.diagnostics.derived import padded
 from distfsi.diagnostics.kernels import peaks as kernels
+from distfsi.diagnostics.watched import Watched
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Snapshot
 from distfsi.scene import description
@@ -32,27 +33,24 @@ class Peaks:
     name = "peaks"
 
     def __init__(self, peaks: description.Peaks, fluid: Fluid, coupling: Coupling | None):
-        self.peaks, self.fluid, self.coupling = peaks, fluid, coupling
+        self.fluid = fluid
         model, blocks = fluid.model, fluid.blocks
         real = fluid.device_state.dtype.name
-        self.kernels = fluid.team.build([kernels.remember_peaks], model.constants, model.bindings, real)
+        self.kernels = fluid.device.build([kernels.remember_peaks], model.constants, model.bindings, real)
         fields = blocks.allocate(len(NAMES))
         fields[:, kernels.ARRIVAL] = np.inf
-        self.fields = DualArray(fluid.team, fields)
-        self._kind = coupling.kind if coupling else DualArray(fluid.team, blocks.allocate(1, np.uint8))
-        self._shape, self._extent = fluid.team.array(np.array(blocks.shape)), fluid.team.array(blocks.extent)
-        self._layers = blocks.grid.ghost_layers
-        self._rows = blocks.local_count * prod(blocks.shape[:2])
+        self.fields = DualArray(fluid.device, fields)
+        self._kind = coupling.kind if coupling else DualArray(fluid.device, blocks.allocate(1, np.uint8))
+        self._limits = kernels.Limits(peaks.ambient_pressure, peaks.arrival_overpressure)
+        self._grid, self._rows = blocks.grid_on(fluid.device), blocks.local_count * prod(blocks.shape[:2])
 
-    def after_step(self, simulation) -> None:
+    def after_step(self, simulation: Watched) -> None:
         """Take in the step just made; before the first one the state at the start."""
-        fluid, peaks = self.fluid, self.peaks
+        fluid = self.fluid
         before = fluid.previous if simulation.steps else fluid.device_state
-        fluid.team.run(
-            self.kernels.remember_peaks, self._rows, self._layers, fluid.device_state, before, self.fields.device,
-            self._kind.read, self._shape, self._extent, peaks.ambient_pressure, peaks.arrival_overpressure,
-            simulation.time, simulation.dt,
-        )  # fmt: skip
+        step = kernels.Step(before, fluid.device_state, simulation.time, simulation.dt)
+        given = step, self.fields.device, self._kind.read, self._limits, self._grid
+        fluid.device.run(self.kernels.remember_peaks, self._rows, *given)
 
     def outputs(self, covered: np.ndarray | None) -> dict[str, np.ndarray]:
         """Fields for the output files: (local blocks, bz, by, bx), NaN where covered or, for the arrival, too early."""

@@ -36,11 +36,8 @@ class FluidSampler:
         share = (scaled - low)[:, None]
         self._weight = np.where(corners == 1, share, 1.0 - share).prod(axis=2)
         self._home = self._weight.argmax(axis=1)  # the corner in whose cell the point is
-        self._find_cells(low.astype(np.int64)[:, None] + corners)
-
-    def _find_cells(self, corner: np.ndarray) -> None:
-        """Number the distinct cells at the corners (n, 2^D, D), and find those on this rank."""
-        blocks, grid = self.fluid.blocks, self.fluid.blocks.grid
+        # the distinct cells at the corners (n, 2^D, D), numbered, and those on this rank
+        corner, blocks = low.astype(np.int64)[:, None] + corners, fluid.blocks
         cell, self._sign = np.zeros((*corner.shape[:2], 3), dtype=np.int64), np.ones(corner.shape)
         for axis in range(corner.shape[2]):
             n = grid.cells[axis]

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
+from distfsi.fluid import fields
 from distfsi.fluid.force import GivenByForce
 from distfsi.fluid.hydrostatics import WeighedGhosts
 from distfsi.fluid.initial import InitialState
-from distfsi.fluid.kernels.records import StageStep, States
+from distfsi.fluid.kernels.records import StageTimes, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.fluid.model import FluidModel
 from distfsi.fluid.rest import Rest
+from distfsi.fluid.stages import SCHEMES, Stage
 from distfsi.fluid.tiles import Tiling
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
@@ -24,20 +25,6 @@ from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.narrowing import present
 from distfsi.scene.description import Fluid as FluidOfScene
 from distfsi.scene.description import Scene
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One stage of a Runge-Kutta method: U_new = U_n + b (U - dt D(U) - U_n); `weight`: its share in the whole step."""
-
-    number: int
-    b: float
-    weight: float
-
-
-SSP_RK2 = (Stage(0, 1.0, 0.5), Stage(1, 0.5, 0.5))  # Gottlieb, Shu, Tadmor, SIAM Rev. 43, 2001
-SSP_RK3 = (Stage(0, 1.0, 1.0 / 6.0), Stage(1, 0.25, 1.0 / 6.0), Stage(2, 2.0 / 3.0, 2.0 / 3.0))  # paper, Eq. 16
-SCHEMES = {"rk2": SSP_RK2, "rk3": SSP_RK3}
 
 
 def _output(number: int) -> int:
@@ -53,33 +40,33 @@ class Fluid:
     waiting_tiles: numbers of the tiles that need no other rank's cells; of the others.
     """
 
-    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, team: Device):
-        self.model, self.blocks, self.team = model, blocks, team
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device):
+        self.model, self.blocks, self.device = model, blocks, device
         self.stages = SCHEMES[scene.time.scheme]
-        self.exchange = GhostExchange(blocks, team, team.build([copy_regions], {}).copy_regions)
+        self.exchange = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
         given = present(scene.fluid)
         real = given.precision
-        self.kernels = team.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
+        self.kernels = device.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
         initial = InitialState(given, model, blocks.grid)
         self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         initial.paint(blocks, buffers[0])
-        self._buffers = [DualArray(team, buffer) for buffer in buffers]
-        self.tiling = Tiling(blocks, team, team.tile_cells(scene.performance.tile_cells), model.conserved)
+        self._buffers = [DualArray(device, buffer) for buffer in buffers]
+        self.tiling = Tiling(blocks, device, device.tile_cells(scene.performance.tile_cells), model.conserved)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
-        self._stages, self._calm = team.array(self.rest.stages), team.array(self.rest.calm)
-        self._extent = team.array(blocks.extent)
-        self._fastest = DualArray(team, np.zeros(blocks.local_count))
+        self._stages, self._calm = device.array(self.rest.stages), device.array(self.rest.calm)
+        self._grid = blocks.grid_on(device)
+        self._fastest = DualArray(device, np.zeros(blocks.local_count))
         forced = bool(model.constants["HYDROSTATIC"])
-        self.force = GivenByForce(blocks, team, model, real) if forced else None
-        self._weighed = WeighedGhosts(blocks, self.exchange, team, model, real) if forced else None
+        self.force = GivenByForce(blocks, device, model, real) if forced else None
+        self._weighed = WeighedGhosts(blocks, self.exchange, device, model, real) if forced else None
         self._before = [pair.host().copy() for pair in self._accounts]
         self._signal: float | None = None
-        self._volumes = DualArray(team, np.ones((1, 1, 1, 1, 1), real))
+        self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
@@ -175,17 +162,16 @@ class Fluid:
     def account_force(self, stage: Stage, dt: float) -> None:
         """Account for what the body force gives in a stage of a step of `dt` [s]; before the stage."""
         if self.force:
-            volumes = self._volumes.read
-            self.force.account(self.input_of(stage), volumes, self._first_active(), self._extent, stage.weight * dt)
+            self.force.account(self.input_of(stage), self._volumes.read, self._grid, stage.weight * dt)
 
     def begin_stage(self) -> None:
         """Find out which tiles are at rest."""
         self.rest.begin_stage()
-        self._stages, self._calm = self.team.array(self.rest.stages), self.team.array(self.rest.calm)
+        self._stages, self._calm = self.device.array(self.rest.stages), self.device.array(self.rest.calm)
 
     def end_stage(self, stage: Stage) -> None:
         """After all tiles were advanced; after the last stage the state is that of the new time."""
-        self.rest.stages = self.team.download(self._stages)
+        self.rest.stages = self.device.download(self._stages)
         self.rest.end_stage()
         if stage is self.stages[-1]:
             new = self._buffers.pop(_output(stage.number))
@@ -196,17 +182,11 @@ class Fluid:
         for."""
         tiles = tiles[~self.rest.calm[tiles] | self.tiling.touches_side[tiles]]
         output = self._buffers[_output(stage.number)]
-        real = output.dtype.type
         states = States(self._buffers[0].device, self.input_of(stage), output.device, self._volumes.device)
-        step = StageStep(real(stage.b), real(dt), stage.weight, *self.rates(dt))
+        times = StageTimes(output.dtype.type(stage.b), dt, stage.weight)
         given = self.tiling.arguments(self._calm, self._stages)
-        chosen = self.team.array(tiles)
-        self.team.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, step, self.tiling.box)
-
-    def rates(self, dt: float) -> list[Any]:
-        """dt/h [s/m] along each of three axes, in the fluid's precision."""
-        real = self._buffers[0].dtype.type
-        return [real(dt / h) for h in self.blocks.grid.spacing]
+        chosen = self.device.array(tiles)
+        self.device.run(self.kernels.advance_tiles, len(tiles), chosen, given, states, times, self.tiling.box)
 
     def wake(self, blocks: np.ndarray) -> None:
         """Something else than a stage has written into cells of the local blocks where `blocks` (local blocks,) is
@@ -221,12 +201,9 @@ class Fluid:
             return self._signal
         if not self.blocks.local_count:
             return 0.0
-        real = self._buffers[0].dtype.type
-        inverse = (real(1.0 / h) for h in self.blocks.grid.spacing)
         changed = np.unique(self.tiling.block[~self.rest.settled])
-        cells = self._buffers[0].device, self._first_active(), self._extent
-        chosen = self.team.array(changed)
-        self.team.run(self.kernels.fastest_signals, len(changed), chosen, *cells, *inverse, self._fastest.device)
+        given = self.device.array(changed), self._buffers[0].device, self._fastest.device, self._grid
+        self.device.run(self.kernels.fastest_signals, len(changed), *given)
         return float(np.max(self._fastest.host()))
 
     @property
@@ -240,13 +217,9 @@ class Fluid:
         if not self.blocks.local_count:
             return 0.0, (), ""
         block = int(np.lexsort((*self.blocks.origin.T, signals))[-1])
-        before = self.team.download(self.previous[block : block + 1])[(0, *self._inside(block))]
-        with np.errstate(all="ignore"):
-            W = self.model.formula("primitives")(before.astype(np.float64))
-            c = self.model.formula("sound_speed")(W)
-        axes = range(self.model.dimensions)
-        speeds = [np.abs(W[self.model.phases + d]) + c for d in axes]
-        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.grid.spacing, strict=False))
+        before = self.device.download(self.previous[block : block + 1])[(0, *self._inside(block))]
+        speeds = fields.speeds(self.model, before.astype(np.float64))
+        signal = sum(speed / h for speed, h in zip(speeds, self.blocks.spacing[block], strict=False))
         cell = np.unravel_index(np.nanargmax(signal), signal.shape)
         position = self._position(block, cell)
         text = f"{max(speed[cell] for speed in speeds):.4g} m/s at ({position}) m"
@@ -256,11 +229,6 @@ class Fluid:
         """The center of the cell (z, y, x) of a local block, in words."""
         centers = zip(self.blocks.cell_centers(block), cell[::-1], strict=True)
         return ", ".join(f"{along[i]:.6g}" for along, i in list(centers)[: self.model.dimensions])
-
-    def _first_active(self) -> int:
-        gx, gy, gz = self.blocks.grid.ghosts
-        _, size_y, size_x = self.blocks.shape
-        return (gz * size_y + gy) * size_x + gx
 
     # ---- looking at it -----------------------------------------------------------------------------------------------
 
@@ -352,46 +320,26 @@ class Fluid:
         `chosen`: the local blocks wanted, by default all.
         """
         chosen = np.arange(self.blocks.local_count) if chosen is None else chosen
-        names = ["density", "velocity", "pressure"] + (["volume_fraction"] if self.model.phases == 2 else [])
         shape = (len(chosen), *self.blocks.block_cells[::-1])
-        fields = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in names}
-        primitives, P, D = self.model.formula("primitives"), self.model.phases, self.model.dimensions
+        found = {name: np.zeros((*shape, 3) if name == "velocity" else shape) for name in fields.names(self.model)}
         for row, block in enumerate(chosen):
             U = self.cells(block).astype(np.float64)
-            W = primitives(U)
             z, y, x = U.shape[1:]
-            values = {"density": U[:P].sum(axis=0), "pressure": W[P + D], "volume_fraction": U[-1]}
-            for name in names:
-                part = fields[name][row, :z, :y, :x]
-                if name == "velocity":
-                    part[..., :D] = np.stack(W[P : P + D], axis=-1)
-                else:
-                    part[:] = values[name]
+            for name, values in fields.written(self.model, U).items():
+                part = found[name][row, :z, :y, :x]
+                part[:] = values
                 if covered is not None:
                     part[self.active(covered, block)] = np.nan
-        return fields
+        return found
 
     def check(self, time: float, covered: np.ndarray | None = None) -> None:
         """Raise Diverged with position, time and state when a cell of this rank, not `covered`, has no valid state."""
         for block in range(self.blocks.local_count):
-            with np.errstate(all="ignore"):
-                W = np.stack(self.model.formula("primitives")(self.cells(block).astype(np.float64)))
-                c = np.asarray(self.model.formula("sound_speed")(tuple(W)))
-            valid = np.isfinite(c) & np.isfinite(W).all(axis=0)
-            if covered is not None:
-                valid |= self.active(covered, block)
-            if not valid.all():
-                z, y, x = np.argwhere(~valid)[0]
-                where = f"at t = {time:.6g} s in the cell at ({self._position(block, (z, y, x))}) m"
-                values = zip([*self._names(), "sound speed"], [*W[:, z, y, x], c[z, y, x]], strict=True)
-                state = ", ".join(f"{name} {value:.6g}" for name, value in values)
-                raise Diverged(f"the fluid has no valid state {where}: {state}")
-
-    def _names(self) -> list[str]:
-        """Of the primitives."""
-        phases, axes = range(self.model.phases), "xyz"[: self.model.dimensions]
-        fraction = ["volume fraction"] if self.model.phases == 2 else []
-        return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), "pressure", *fraction]
+            ignored = covered is not None and self.active(covered, block)
+            invalid = fields.first_invalid(self.model, self.cells(block).astype(np.float64), ignored)
+            if invalid is not None:
+                where = f"at t = {time:.6g} s in the cell at ({self._position(block, invalid[0])}) m"
+                raise Diverged(f"the fluid has no valid state {where}: {invalid[1]}")
 
     def active(self, field: np.ndarray, block: int) -> np.ndarray:
         """View (…, z, y, x) of the active cells of a local block in a field (local blocks, …, Z, Y, X)."""

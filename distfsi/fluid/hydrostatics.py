@@ -22,7 +22,7 @@ class WeighedGhosts:
     def __init__(self, blocks: Blocks, exchange: GhostExchange, device: Device, model: FluidModel, real: str):
         self._device = device
         self._kernel = device.build([weigh_ghosts], model.constants, model.bindings, real).weigh_ghosts
-        self._spacing = device.array(np.array(blocks.grid.spacing, dtype=real))
+        self._grid = blocks.grid_on(device)
         forces = model.body_force.acceleration
         axes = [axis for axis in range(blocks.grid.dimensions) if forces[axis] != 0.0]
         self._ready, self._waiting = (
@@ -34,7 +34,7 @@ class WeighedGhosts:
         """Give the ghosts of a `state` their pressure: of the blocks that have been `waiting` for other ranks, or of
         the rest."""
         columns = self._waiting if waiting else self._ready
-        self._device.run(self._kernel, columns.shape[0], columns, state, self._spacing)
+        self._device.run(self._kernel, columns.shape[0], columns, state, self._grid)
 
 
 def _columns(blocks: Blocks, chosen: list[int], axes: list[int]) -> Iterable[np.ndarray]:

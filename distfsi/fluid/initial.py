@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -93,9 +94,10 @@ class InitialState:
             parts = whole if region.shape is None else fractions(blocks, region.shape)
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
+                where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
                     new = self._in_block(states, blocks.origin[block], blocks.extent[block])
-                    self._lay_over(field[(block, slice(None), *active)], new, part)
+                    self._lay_over(field[where], new, part)
 
     def _states(self, state: FluidState) -> np.ndarray:
         """Conserved states (variables, n) of a region in each layer, or (variables, 1) of one that has no layers."""

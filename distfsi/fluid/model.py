@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 from distfsi.fluid.formulas import (
     euler,
     five_equation,
@@ -79,8 +80,15 @@ class FluidModel:
 
     def formula(self, name: str) -> Callable[..., Any]:
         """One of the model's formulas ("primitives", "conserved" …) in plain Python, also for arrays."""
-        bound = self.bindings[name]
-        return plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        if name not in self._made:
+            bound = self.bindings[name]
+            self._made[name] = plain(bound.function, {**self.constants, **bound.constants}, self.bindings)
+        return self._made[name]
+
+    @cached_property
+    def _made(self) -> dict[str, Callable[..., Any]]:
+        """The formulas that were asked for before."""
+        return {}
 
 
 def fluid_model(scene: Scene) -> FluidModel:
@@ -107,7 +115,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "ASYMMETRIC": asymmetric,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
         "HYDROSTATIC": any(body_force.acceleration),
-        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "paper",
+        "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}

@@ -42,7 +42,7 @@ class Tiling:
         self.first = np.array(first, dtype=np.int64).reshape(-1, 3)
         self.through = DualArray(device, np.zeros((len(self.table), 6, conserved)))
         self.limited = DualArray(device, np.zeros(len(self.table), dtype=np.int64))
-        self._on_device = device.array(self.table)
+        self._on_device, self._spacing = device.array(self.table), device.array(blocks.spacing)
 
     @property
     def block(self) -> np.ndarray:
@@ -61,7 +61,8 @@ class Tiling:
 
     def arguments(self, calm: Any, stages: Any) -> records.Tiles:
         """What a stage is given: the tiles, which of them are calm and for how many stages each has been at rest."""
-        return records.Tiles(self._on_device, calm, stages, self.through.device, self.limited.device)
+        counted = self.through.device, self.limited.device
+        return records.Tiles(self._on_device, calm, stages, *counted, self._spacing)
 
 
 def domain_sides(blocks: Blocks, first: np.ndarray, cells: np.ndarray) -> int:

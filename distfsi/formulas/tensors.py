@@ -70,7 +70,7 @@ def determinant(m):
         )
 
 
-def least_eigenvalue(m):
+def minimum_eigenvalue(m):
     """Lower bound of the eigenvalues of a symmetric positive matrix, tight if the others are equal; NaN for zero."""
     if DIMENSIONS == 1:
         return m[0][0]

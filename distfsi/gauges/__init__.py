@@ -110,8 +110,11 @@ class PressureRecord:
 class Particles(Protocol):
     """The particles of this rank."""
 
-    columns: Mapping[str, np.ndarray]
     dimensions: int
+
+    @property
+    def columns(self) -> Mapping[str, np.ndarray]:
+        """What is known of each."""
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """The fields of the rows that are `chosen`, vectors with three components."""

@@ -16,8 +16,8 @@ BY_BLOCK = ("cells", "sums")  # kinds of arrays whose rows follow the blocks; pa
 
 
 class Balance:
-    """Watches the parts of a run: each has `team.seconds`, how long it has computed on this rank, and `workload()`, how
-    much there is to do on each local block, in a unit of its own.
+    """Watches the parts of a run: each has `device.seconds`, how long it has computed on this rank, and `workload()`,
+    how much there is to do on each local block, in a unit of its own.
 
     imbalance  computing time of the busiest rank over the mean of all, between the last two calls of `watch`
     """
@@ -51,7 +51,7 @@ class Balance:
         return costs if then <= now * 2.0 / 3.0 else None
 
     def _clocks(self) -> np.ndarray:
-        return np.array([part.team.seconds for part in self._parts])
+        return np.array([part.device.seconds for part in self._parts])
 
 
 def _excess(costs: np.ndarray, owners: np.ndarray, ranks: int) -> float:

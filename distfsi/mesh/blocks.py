@@ -5,8 +5,9 @@ Index axes are x, y, z in this order everywhere except in array shapes, where x 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,14 @@ GHOSTS = 2  # layers of ghost cells on each side of every used axis, where nothi
 Snapshot = Mapping[str, Mapping[str, np.ndarray]]
 
 
+T = TypeVar("T")
+
+
+def _three(values: Sequence[T]) -> tuple[T, T, T]:
+    x, y, z = values
+    return x, y, z
+
+
 @dataclass(frozen=True)
 class Grid:
     """Equal cells of size `spacing` [m] from the corner `lower` [m]; always three axes.
@@ -40,27 +49,35 @@ class Grid:
     ghost_layers: int = GHOSTS
 
     @classmethod
-    def of(cls, lower: tuple, upper: tuple, cells: tuple, boundaries: tuple, ghost_layers: int = GHOSTS) -> Grid:
+    def of(
+        cls,
+        lower: tuple[float, ...],
+        upper: tuple[float, ...],
+        cells: tuple[int, ...],
+        boundaries: tuple[tuple[str, str], ...],
+        ghost_layers: int = GHOSTS,
+    ) -> Grid:
         """The grid with the given values for each of its 1 to 3 dimensions."""
         unused = 3 - len(cells)
+        spacing = [(b - a) / n for a, b, n in zip(lower, upper, cells, strict=True)]
         return cls(
             dimensions=len(cells),
-            cells=(*cells, *[1] * unused),
-            lower=(*lower, *[0.0] * unused),
-            spacing=(*((b - a) / n for a, b, n in zip(lower, upper, cells, strict=True)), *[1.0] * unused),
-            boundaries=(*(tuple(pair) for pair in boundaries), *[("none", "none")] * unused),
+            cells=_three([*cells, *[1] * unused]),
+            lower=_three([*lower, *[0.0] * unused]),
+            spacing=_three([*spacing, *[1.0] * unused]),
+            boundaries=(*((low, high) for low, high in boundaries), *[("none", "none")] * unused),
             ghost_layers=ghost_layers,
         )
 
     @property
     def ghosts(self) -> tuple[int, int, int]:
         """Ghost layers on each side of x, y, z."""
-        return tuple(self.ghost_layers if axis < self.dimensions else 0 for axis in range(3))
+        return _three([self.ghost_layers if axis < self.dimensions else 0 for axis in range(3)])
 
     @property
     def upper(self) -> tuple[float, float, float]:
         """The corner opposite to `lower` [m]."""
-        return tuple(a + n * h for a, n, h in zip(self.lower, self.cells, self.spacing, strict=True))
+        return _three([a + n * h for a, n, h in zip(self.lower, self.cells, self.spacing, strict=True)])
 
 
 class Blocks:
@@ -75,8 +92,10 @@ class Blocks:
     owners          (count,) rank of each block; ascending
     first           curve index of this rank's first block
     local_count     number of this rank's blocks
-    origin          (local_count, 3) global index of the first active cell
+    level           (local_count,) how often its cells are halved from those of the grid: 0, the only level there is
+    origin          (local_count, 3) global index of the first active cell on its level
     extent          (local_count, 3) active cells; fewer than block_cells at the high ends of the grid
+    spacing         (local_count, 3) size of its cells [m]
     shape           (Z, Y, X) of a block in memory, ghosts included
     """
 
@@ -105,18 +124,20 @@ class Blocks:
         self.local_count = end - self.first
         self.origin = origin[self.first : end]
         self.extent = extent[self.first : end]
+        self.level = np.zeros(self.local_count, dtype=np.int64)
+        self.spacing = np.array(grid.spacing) / 2.0 ** self.level[:, None]
         self.shape = tuple(n + 2 * g for n, g in zip(self.block_cells[::-1], grid.ghosts[::-1], strict=True))
 
     def grid_on(self, device: Device) -> BlockGrid:
         """What kernels of a device know of the grid and of this rank's blocks."""
         steps = (1, self.shape[2], self.shape[2] * self.shape[1])
-        known = (self.shape, steps, self.grid.lower, self.grid.spacing, self.grid.cells, self.origin, self.extent)
+        known = (self.shape, steps, self.grid.lower, self.grid.cells, self.origin, self.extent, self.spacing)
         return BlockGrid(*(device.array(np.array(values)) for values in known))
 
     def table_on(self, device: Device) -> BlockTable:
         """The same of which cells all blocks have."""
-        known = (self.block_cells, self.curve_index)
-        return BlockTable(*(device.array(np.array(values)) for values in known), self.first)
+        cells, spacing, index = (np.array(v) for v in (self.block_cells, self.grid.spacing, self.curve_index))
+        return BlockTable(device.array(cells), device.array(spacing), device.array(index), self.first)
 
     def allocate(self, variables: int, dtype: type = np.float64) -> np.ndarray:
         """A field of zeros (local_count, variables, Z, Y, X)."""
@@ -125,7 +146,8 @@ class Blocks:
     def without_ghosts(self, field: np.ndarray) -> np.ndarray:
         """View (..., bz, by, bx) of a field (..., Z, Y, X): whole blocks, also where they are partly filled."""
         ghosts, cells = self.grid.ghosts[::-1], self.block_cells[::-1]
-        return field[(..., *(slice(g, g + n) for g, n in zip(ghosts, cells, strict=True)))]
+        where: tuple[Any, ...] = (..., *(slice(g, g + n) for g, n in zip(ghosts, cells, strict=True)))
+        return np.asarray(field[where])
 
     def coordinates_of(self, positions: np.ndarray) -> np.ndarray:
         """Coordinates (n, 3) of the block that each of `positions` (n, dimensions) [m] is in or, outside, nearest to.
@@ -159,6 +181,6 @@ class Blocks:
         return tuple(
             low + (start + np.arange(number) + 0.5) * h
             for low, h, start, number in zip(
-                self.grid.lower, self.grid.spacing, self.origin[block], self.extent[block], strict=True
+                self.grid.lower, self.spacing[block], self.origin[block], self.extent[block], strict=True
             )
         )

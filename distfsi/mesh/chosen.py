@@ -12,6 +12,7 @@ from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.regions import Regions
 from distfsi.mesh.route import Route
 from distfsi.mesh.rows import Rows
+from distfsi.narrowing import present
 
 
 class Choice:
@@ -53,6 +54,8 @@ class ChosenGhosts:
             Choice(rows, *listed(out.regions, "source")),
         )
         self._givers, self._takers = into.rank_of_cells(), out.rank_of_cells()
+        self._route: Route | None = None  # as of choose()
+        self._staged: Any = None  # what the device may still read
 
     def choose(self, mark: Any) -> None:
         """From now on the ghosts of cells with a `mark` other than 0 are exchanged; `mark`: a flat field of one
@@ -76,24 +79,24 @@ class ChosenGhosts:
         field   (local blocks, variables, Z, Y, X) of the device, all of one type
         parity  (variables,) int64, of the device: the axes, as bits, whose reflection changes the variable's sign
         """
-        given = [(field.reshape(-1), parity) for field, parity in given]
-        stride, route = sum(parity.shape[0] for _, parity in given), self._route
+        fields = [(field.reshape(-1), parity) for field, parity in given]
+        stride, route = sum(parity.shape[0] for _, parity in fields), present(self._route)
         exchanged = route.leaving or route.arriving
         if exchanged:
-            arrived = self._transfer(given, stride)
+            arrived = self._transfer(fields, stride)
         to, of, flips = self._local.columns
-        for flat, parity in given:
+        for flat, parity in fields:
             self._device.run(self._kernels.copy_cells, to.shape[0], to, of, flips, parity, self._cells, flat)
         if exchanged:
             column, (to, _) = 0, self._into.columns
-            for flat, parity in given:
+            for flat, parity in fields:
                 target = (parity.shape[0], self._cells, arrived, stride, column, flat)
                 self._device.run(self._kernels.unpack_cells, to.shape[0], to, *target)
                 column += parity.shape[0]
 
     def _transfer(self, given: list[tuple[Any, Any]], stride: int) -> Any:
         """The rows of the ghosts, packed, on the device."""
-        device, route = self._device, self._route
+        device, route = self._device, present(self._route)
 
         def pack(packed: Any) -> None:
             column = 0
@@ -102,5 +105,5 @@ class ChosenGhosts:
                 device.run(self._kernels.pack_cells, route.leaving, *source)
                 column += parity.shape[0]
 
-        arrived, self._staged = route.carry(device, stride, given[0][0].dtype, pack)  # the device may still read it
+        arrived, self._staged = route.carry(device, stride, given[0][0].dtype, pack)
         return arrived

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,11 @@ class Communicator:
         """The (pickled) value of rank 0, on every rank."""
         return self.world.bcast(value)
 
-    def allgather(self, value: object) -> list:
+    def allgather(self, value: Any) -> list[Any]:
         """The (pickled) values of all ranks in rank order, on every rank."""
         return self.world.allgather(value)
 
-    def bring(self, values: Sequence, rank: int) -> list:
+    def bring(self, values: Sequence[Any], rank: int) -> list[Any]:
         """The (pickled) `values` of one rank, each in a message of its own, on rank 0; nothing on the others."""
         if self.rank == rank == 0:
             return list(values)
@@ -106,7 +107,7 @@ class Communicator:
 
         The data is on disk when this returns. Raises OSError on all ranks when one of them cannot open or write.
         """
-        failures = []
+        failures: list[str] = []
         with _noting(failures):
             file = MPI.File.Open(self.world, os.fspath(path), MPI.MODE_WRONLY)
         if not failures:  # collective: open on all ranks or on none
@@ -162,7 +163,7 @@ def _write_whole(file: MPI.File, offset: int, array: np.ndarray) -> None:
 def install_abort_on_exception(communicator: Communicator) -> None:
     """From now on an uncaught exception on one rank ends all ranks, with the exception's `exit_code` (default 1)."""
 
-    def report_and_abort(kind, error, trace) -> None:
+    def report_and_abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         lines = "".join(traceback.format_exception(kind, error, trace))
         print(f"rank {communicator.rank}: {lines}", file=sys.stderr)
         communicator.abort(getattr(error, "exit_code", 1))

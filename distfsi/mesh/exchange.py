@@ -13,6 +13,7 @@ from mpi4py import MPI
 from distfsi.device.interface import Device
 from distfsi.mesh.blocks import Blocks
 from distfsi.mesh.regions import Regions
+from distfsi.narrowing import present
 
 
 class Messages:
@@ -89,6 +90,9 @@ class GhostExchange:
         self.waiting = np.unique(self.incoming.regions.block) - blocks.first
         self.ready = np.setdiff1d(np.arange(blocks.local_count), self.waiting)
         self._plans: dict[tuple[int, np.dtype], Plan] = {}
+        # What start() leaves to finish().
+        self._requests: list[MPI.Request] = []
+        self._unpack: tuple[Plan, Any, Any] | None = None
 
     def start(self, field: Any, mirror: np.ndarray, inflow: np.ndarray | None = None) -> None:
         """Send what other ranks need of `field`, and fill the ghosts whose source is on this rank.
@@ -113,7 +117,7 @@ class GhostExchange:
 
     def finish(self) -> None:
         """Wait for the messages and fill the remaining ghosts."""
-        plan, flat, mirror = self._unpack
+        plan, flat, mirror = present(self._unpack)
         MPI.Request.Waitall(self._requests)
         with self.device.asynchronous():
             self.device.upload(plan.incoming.device, plan.incoming.values)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from distfsi.mesh.rows import Rows, chunks
 
 # How a value changes in an image: "position" is mirrored about the plane; otherwise, for each component, the axes whose
 # reflection changes its sign: scalar ((),), vector ((0,), (1,)), symmetric tensor xx, yy, xy ((0, 0), (1, 1), (0, 1)).
-Parity = str | tuple[tuple[int, ...], ...]
+Parity = Literal["position"] | tuple[tuple[int, ...], ...]
 
 
 class ParticleExchange:
@@ -61,7 +61,9 @@ class ParticleExchange:
         now, rows = block.host(), device.array(leaving)
         if not (unsorted or len(leaving) or route.arriving):
             return DualArray(device, now)
-        arrived = route.brought({name: device.download(self.rows.taken(*columns.read(name), rows)) for name in columns})
+        arrived = route.brought(
+            {name: device.download(self.rows.taken(columns.read(name)[0], rows)) for name in columns}
+        )
         stays = np.flatnonzero(self.blocks.owners[now] == communicator.rank)
         home = np.concatenate([now[stays], self.blocks.block_of(arrived["position"])])
         order = np.lexsort((np.concatenate([columns["id"][stays], arrived["id"]]), home))
@@ -70,7 +72,7 @@ class ParticleExchange:
             kept = device.array(rows)
             for name in columns:
                 others = device.array(np.ascontiguousarray(arrived[name]))
-                columns.adopt(name, self.rows.taken(*columns.read(name), kept, others))
+                columns.adopt(name, self.rows.taken(columns.read(name)[0], kept, others))
         return DualArray(device, home[order])
 
     def _some_moved(self, position: Any, block: DualArray) -> bool:
@@ -159,8 +161,8 @@ class ParticleExchange:
         """The keys of the own particles and the others: the same object as last time if they are the same."""
         last = self._key
         if last is None or last.id is not id or not np.array_equal(last.host[len(id) :], others):
-            self._key = Key(self.device, id, np.concatenate([id * IMAGES, others]))
-        return self._key
+            last = self._key = Key(self.device, id, np.concatenate([id * IMAGES, others]))
+        return last
 
     @staticmethod
     def _need_images(

@@ -116,7 +116,7 @@ class Regions:
     @property
     def constant(self) -> np.ndarray:
         """Which regions (n,) are filled with an inflow's constants."""
-        return (self.run["inflow"] >= 0).any(axis=1)
+        return np.asarray((self.run["inflow"] >= 0).any(axis=1))
 
     @property
     def volume(self) -> np.ndarray:

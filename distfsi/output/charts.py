@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 
 WIDTH, RESOLUTION = 11.0, 90  # of a sheet in inches, and in dots per inch
 CHART_HEIGHT, TITLE = 3.6, 0.6  # of a row of charts; what a picture needs for its title and axis [inches]
-STYLE = {"font.size": 9, "axes.titlesize": 9, "axes.formatter.useoffset": False}
+STYLE: dict[Any, Any] = {"font.size": 9, "axes.titlesize": 9, "axes.formatter.useoffset": False}
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,7 @@ def draw_pictures(path: Path, pictures: Sequence[Picture], columns: int, unit: s
 
 def _draw_picture(axes: Axes, picture: Picture) -> None:
     low, high = picture.limits
-    colors = {"cmap": picture.colors, "vmin": low, "vmax": high}
-    image = axes.imshow(picture.values, origin="lower", extent=picture.extent, **colors)
+    image = axes.imshow(picture.values, cmap=picture.colors, vmin=low, vmax=high, origin="lower", extent=picture.extent)
     axes.set_title(picture.title)
     if picture.label is not None:
         axes.figure.colorbar(image, ax=axes, label=picture.label, pad=0.02)

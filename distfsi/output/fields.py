@@ -82,7 +82,7 @@ class FieldWriter:
         Unused axes are left out of the datasets and have no extent: VTK then shows a line or a flat image.
         """
         grid, used = self._blocks.grid, slice(3 - self._blocks.grid.dimensions, 3)
-        chunk = self._blocks.block_cells[::-1][used]
+        chunk = tuple(self._blocks.block_cells)[::-1][used]
         shapes = {name: (array.shape[4:], array.dtype) for name, array in cells.items()}
         pieces = [
             (name, (*origin[::-1][used], *(0,) * len(block.shape[3:])), block.reshape(*chunk, *block.shape[3:]))
@@ -146,7 +146,7 @@ def read_layer(
             raise ValueError(f"the plane at {position:g} m lies outside of the domain along {'xyz'[normal]}")
         others = [axis for axis in (2, 1, 0) if axis != normal]
         steps = [-(-cells[axis] // LARGEST_LAYER) if cells[others].min() > 1 else 1 for axis in others]
-        chosen = [slice(None, None, step) for step in steps]
+        chosen: list[slice | int] = [slice(None, None, step) for step in steps]
         chosen.insert(2 - normal, layer)
         shape = [-(-cells[axis] // step) for axis, step in zip(others, steps, strict=True)]
         data = root["CellData"]
@@ -269,7 +269,7 @@ def _keep_until(directory: Path, until: float | None) -> dict[str, dict[str, flo
     kept: dict[str, dict[str, float]] = {}
     for kind in KINDS:
         listed = series(directory, kind) if until is not None else []
-        kept[kind] = {path.name: time for time, path in listed if time <= until}
+        kept[kind] = {path.name: time for time, path in listed if until is not None and time <= until}
         if kept[kind]:
             _write_series(directory, kind, kept[kind])
         else:

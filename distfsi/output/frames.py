@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from distfsi.narrowing import present
 from distfsi.output.fields import axis_across, field_names, read_grid, read_layer, read_particles, series
 
 AXES = "xyz"
@@ -94,20 +95,20 @@ class Film:
             if self._cells:
                 yield self._with_cells(self._cells[number][1], particles, names)
             else:
-                time, columns = read_particles(particles)
+                time, columns = read_particles(present(particles))
                 normal, at = self._plane or (2, 0.5 * (self._box[0][2] + self._box[1][2]))
                 axes = ACROSS[normal]
-                extent = tuple(float(corner[axis]) for axis in axes for corner in self._box)
-                yield Frame(time, extent, {}, *_near_plane(columns, normal, at), axes)
+                left, right, low, high = (float(corner[axis]) for axis in axes for corner in self._box)
+                yield Frame(time, (left, right, low, high), {}, *_near_plane(columns, normal, at), axes)
 
     def _with_cells(self, cells: Path, particles: Path | None, names: Sequence[str] | None) -> Frame:
         normal, at = self._plane or (axis_across(cells), None)
         time, fields, (low, high) = read_layer(cells, normal, at, names)
         axes = ACROSS[normal]
-        extent = tuple(float(corner[axis]) for axis in axes for corner in (low, high))
+        left, right, below, above = (float(corner[axis]) for axis in axes for corner in (low, high))
         at = 0.5 * (low[normal] + high[normal]) if at is None else at
         near, distance = _near_plane(read_particles(particles)[1], normal, at) if particles else ({}, 0.0)
-        return Frame(time, extent, fields, near, distance, axes)
+        return Frame(time, (left, right, below, above), fields, near, distance, axes)
 
     def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Low and high corner of the box around all particles at all times, with some room."""
@@ -164,7 +165,7 @@ def _near_plane(columns: Mapping[str, np.ndarray], normal: int, at: float) -> tu
         return dict(columns), 0.0
     some = position[:: max(1, len(position) // 1000)]
     # In a lattice a particle on the surface still has one neighbour more than there are dimensions.
-    neighbours = min(np.count_nonzero(np.ptp(position, axis=0)) + 1, len(position) - 1)
+    neighbours = min(int(np.count_nonzero(np.ptp(position, axis=0))) + 1, len(position) - 1)
     spacing = float(np.median(cKDTree(position).query(some, k=neighbours + 1)[0][:, -1]))
     near = np.abs(position[:, normal] - at) <= 0.5 * spacing
     return {name: column[near] for name, column in columns.items()}, spacing

@@ -37,7 +37,7 @@ class History:
         header, *rows = lines or [_line(self._columns)]
         if header != _line(self._columns):
             return [f"{self._path}: has other columns than this run writes; move it away before the restart"]
-        kept = [row for row in rows if float(next(csv.reader([row]))[0]) <= until]
+        kept = [row for row in rows if until is not None and float(next(csv.reader([row]))[0]) <= until]
         temporary = self._path.with_name(self._path.name + ".tmp")
         temporary.write_text("".join([header, *kept]), newline="")
         replace(temporary, self._path)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from distfsi.errors import InputError
 from distfsi.output.fields import field_names, series
@@ -43,7 +44,7 @@ def describe(directory: Path) -> str:
 Line = tuple[str, str]
 
 
-def _journal(journal: dict) -> Iterator[Line]:
+def _journal(journal: Mapping[str, Any]) -> Iterator[Line]:
     if not journal:
         return
     took = f" after {format_duration(journal['seconds'])}" if "seconds" in journal else ""
@@ -57,13 +58,13 @@ def _journal(journal: dict) -> Iterator[Line]:
     yield "run", f"{journal['started']}, distfsi {journal['distfsi']}, {where}"
 
 
-def _progress(history: Path, journal: dict) -> Iterator[Line]:
+def _progress(history: Path, journal: Mapping[str, Any]) -> Iterator[Line]:
     if not history.exists():
         return
     rows = read_history(history)
     if len(rows["step"]):
-        end = f" of {format_time(journal['end time [s]'])}" if journal else ""
-        reached = f"{format_time(rows['time [s]'][-1])}{end} after {rows['step'][-1]:,.0f} steps"
+        end = f" of {format_time(float(journal['end time [s]']))}" if journal else ""
+        reached = f"{format_time(float(rows['time [s]'][-1]))}{end} after {rows['step'][-1]:,.0f} steps"
         yield "reached", f"{reached}, by the {len(rows['step'])} rows of {history.name}"
 
 

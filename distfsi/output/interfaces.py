@@ -2,19 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+Fields = Mapping[str, np.ndarray]
+
 
 class Origin(Protocol):
     """What a run goes on from: a state of this time [s] and step, and the last restart file, if there is one."""
 
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def step(self) -> int: ...
+
+    @property
+    def path(self) -> Path | None: ...
+
+
+class Simulation(Protocol):
+    """The run, between two steps."""
+
+    scene: Any
     time: float
-    step: int
-    path: Path | None
+    steps: int
+
+    @property
+    def communicator(self) -> Communicator: ...
+
+    @property
+    def blocks(self) -> FilledBlocks: ...
+
+    @property
+    def timers(self) -> Callable[[str], AbstractContextManager[object]]:
+        """Count the time of a part, by its name."""
+
+    def outputs(self) -> tuple[Fields | None, Fields | None]:
+        """Collective. Fields of cells and of particles."""
+
+
+class Table(Protocol):
+    """Values of the run over time."""
+
+    columns: list[str]
+
+
+class Budget(Table, Protocol):
+    """Those of the history."""
+
+    def row(self, simulation: Any) -> Mapping[str, float | int | str]:
+        """Collective. The values now, by column."""
+
+
+class Performance(Table, Protocol):
+    """Where the time goes."""
+
+    def row(self, step: int, time: float) -> list[float]:
+        """Collective. The values of all columns."""
 
 
 class Communicator(Protocol):
@@ -27,10 +76,10 @@ class Communicator(Protocol):
     def broadcast(self, value: Any) -> Any:
         """Rank 0's `value` on every rank."""
 
-    def allgather(self, value: Any) -> list:
+    def allgather(self, value: Any) -> list[Any]:
         """The values of all ranks, by rank, on every rank."""
 
-    def bring(self, values: Sequence[Any], rank: int) -> list:
+    def bring(self, values: Sequence[Any], rank: int) -> list[Any]:
         """The `values` of one rank on rank 0; nothing elsewhere."""
 
     def write_at(self, path: Path, offsets: Sequence[int], arrays: Sequence[np.ndarray]) -> None:
@@ -59,5 +108,18 @@ class Blocks(Protocol):
     @property
     def grid(self) -> Grid: ...
 
-    block_cells: tuple[int, int, int]
-    origin: np.ndarray  # (own blocks, 3): global index x, y, z of a block's first cell
+    @property
+    def block_cells(self) -> tuple[int, ...]:
+        """Cells of a whole block along x, y, z."""
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(own blocks, 3): global index x, y, z of a block's first cell."""
+
+
+class FilledBlocks(Blocks, Protocol):
+    """Blocks that may be filled in part."""
+
+    @property
+    def extent(self) -> np.ndarray:
+        """(own blocks, 3): cells of each along x, y, z."""

@@ -16,7 +16,7 @@ from distfsi.output.storage import on_root, replace
 
 NAME = "run.json"
 RESULTS = (NAME, "*.csv", "*.vtkhdf", "*.vtkhdf.series", "restart-*.h5", "summary.png")
-ENDINGS = {Stopped: "stopped", Diverged: "diverged"}
+ENDINGS: dict[type[BaseException], str] = {Stopped: "stopped", Diverged: "diverged"}
 
 
 def set_aside(directory: Path, communicator: Communicator) -> None:
@@ -65,12 +65,14 @@ class Journal:
         self._write()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         status = "done" if kind is None else ENDINGS.get(kind, "failed")
         self._notes |= {"status": status, "seconds": round(clock.monotonic() - self._started, 1)}
         self._notes["seconds by part"] = {part: round(seconds, 3) for part, seconds in self._seconds.items()}
         if error is not None:
-            self._notes["message"] = str(error) if isinstance(error, DistfsiError) else f"{kind.__name__}: {error}"
+            self._notes["message"] = (
+                str(error) if isinstance(error, DistfsiError) else f"{type(error).__name__}: {error}"
+            )
         self._write()
 
     def _write(self) -> None:

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Normalize
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, SubFigure
 
+from distfsi.narrowing import of_kind
 from distfsi.output.frames import AXES, Frame
 from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
 from distfsi.output.progress import format_time
@@ -131,7 +132,11 @@ class Sheet:
 
 
 def draw_maps(
-    figure: FigureBase, sheet: Sheet, frames: Sequence[Frame], fields: Sequence[Colors], particles: Colors | None
+    figure: Figure | SubFigure,
+    sheet: Sheet,
+    frames: Sequence[Frame],
+    fields: Sequence[Colors],
+    particles: Colors | None,
 ) -> None:
     """Each field at each time, particles on top."""
     grid = grid_of_panels(figure, *sheet.shape, sheet.margins, (GAP, TITLE + 0.1), sharex=True, sharey=True)
@@ -148,7 +153,7 @@ def draw_maps(
             if particles:
                 _draw_particles(panel, frame, particles, length)
     if particles:
-        draw_bar(figure, by_field.ravel(), particles.map, particles.label, sides[1])
+        draw_bar(figure, by_field.ravel().tolist(), particles.map, particles.label, sides[1])
     grid[0, 0].set(xlim=(left / length, right / length), ylim=(bottom / length, top / length))
     horizontal, vertical = (AXES[axis] for axis in frames[0].axes)
     for panel in grid[-1]:
@@ -160,8 +165,9 @@ def draw_maps(
 def _draw_field(axes: Iterable[Axes], frames: Sequence[Frame], colors: Colors, length: float) -> None:
     for panel, frame in zip(axes, frames, strict=True):
         image = np.ma.masked_invalid(values(frame.cells, colors.name, 2) / colors.size)
-        extent = [edge / length for edge in frame.extent]
-        panel.imshow(image, origin="lower", extent=extent, norm=colors.map.norm, cmap=colors.map.cmap, aspect="auto")
+        left, right, low, high = (edge / length for edge in frame.extent)
+        norm, edges = of_kind(Normalize, colors.map.norm), (left, right, low, high)
+        panel.imshow(image, origin="lower", extent=edges, norm=norm, cmap=colors.map.cmap, aspect="auto")
 
 
 def _draw_particles(panel: Axes, frame: Frame, colors: Colors, length: float) -> None:

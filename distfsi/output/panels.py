@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.transforms import Bbox
 
+from distfsi.narrowing import present
 from distfsi.output.frames import Frame
 from distfsi.output.progress import format_time
 from distfsi.output.quantities import UNITS
@@ -37,7 +39,7 @@ def profiles_height(frames: Sequence[Frame]) -> float:
     return len(_profile_names(frames)) * (PROFILE_HEIGHT + 0.5 * GAP) + XLABEL + TITLE
 
 
-def draw_profiles(figure: FigureBase, frames: Sequence[Frame], fitted: Sequence[Frame] = ()) -> None:
+def draw_profiles(figure: Figure | SubFigure, frames: Sequence[Frame], fitted: Sequence[Frame] = ()) -> None:
     """One row per field over x, one colour per time: cells as lines, particles as dots; axes fit the frames `fitted`,
     by default those drawn."""
     fitted = fitted or frames
@@ -62,11 +64,12 @@ def _draw_profile(axes: Axes, name: str, frames: Sequence[Frame], fitted: Sequen
         for x, values, style in _curves(frame, name):
             axes.plot(x / length, values / size, style, color=color, markersize=3)
     norm = norm_of([values / size for values in everything])
+    low, high = present(norm.vmin), present(norm.vmax)
     if name in LOGARITHMIC and isinstance(norm, LogNorm):
-        axes.set(yscale="log", ylim=(norm.vmin / 1.3, norm.vmax * 1.3))
+        axes.set(yscale="log", ylim=(low / 1.3, high * 1.3))
     else:
-        room = 0.05 * ((norm.vmax - norm.vmin) or abs(norm.vmax) or 1.0)
-        axes.set_ylim(norm.vmin - room, norm.vmax + room)
+        room = 0.05 * ((high - low) or abs(high) or 1.0)
+        axes.set_ylim(low - room, high + room)
     axes.set_ylabel(label_of(name, unit))
     axes.grid(alpha=0.3)
 
@@ -91,7 +94,7 @@ def _along_x(values: np.ndarray) -> np.ndarray:
 # ---- history ---------------------------------------------------------------------------------------------------------
 
 
-def draw_history(figure: FigureBase, history: Mapping[str, np.ndarray]) -> None:
+def draw_history(figure: Figure | SubFigure, history: Mapping[str, Any]) -> None:
     """Over time: the change of each energy, the drift of each conserved total, and the time step."""
     time = history["time [s]"]
     size, unit = scaled("s", largest([time]))
@@ -125,7 +128,7 @@ def _energies(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     names = [name for name in history if "energy [J" in name]
     energies = {name: history[name] for name in names if not name.startswith("coupling ")}
     created = [history[name] for name in names if name.startswith("coupling ")]
-    return energies | ({"created by the coupling": sum(created)} if created else {})
+    return energies | ({"created by the coupling": np.sum(created, axis=0)} if created else {})
 
 
 def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -138,7 +141,7 @@ def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def draw_legend(axes: Axes, columns: int = 2) -> None:
     """A small legend above a panel, clear of the exponent of its axis."""
-    height = axes.get_window_extent().height / axes.get_figure(root=True).dpi
+    height = axes.get_window_extent().height / present(axes.get_figure(root=True)).dpi
     axes.legend(
         fontsize="x-small",
         loc="lower left",
@@ -153,12 +156,12 @@ def draw_legend(axes: Axes, columns: int = 2) -> None:
 
 
 def grid_of_panels(
-    figure: FigureBase,
+    figure: Figure | SubFigure,
     rows: int,
     columns: int,
     margins: tuple[float, float, float, float],
     gaps: tuple[float, float],
-    **shared: bool,
+    **shared: Any,
 ) -> np.ndarray:
     """Equal panels within the margins (left, right, below, above), `gaps` apart along x and y."""
     width, height = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
@@ -176,7 +179,7 @@ def grid_of_panels(
     return figure.subplots(rows, columns, squeeze=False, gridspec_kw=layout, **shared)
 
 
-def draw_bar(figure: FigureBase, axes: Sequence[Axes], colors: ScalarMappable, label: str, side: str) -> None:
+def draw_bar(figure: Figure | SubFigure, axes: Iterable[Axes], colors: ScalarMappable, label: str, side: str) -> None:
     """A colour bar along the right or the lower edge of some panels."""
     width, height = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
     box = Bbox.union([panel.get_position() for panel in axes])

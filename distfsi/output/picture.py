@@ -7,6 +7,7 @@ those of the cells. Columns of the history: "time [s]", "time step [s]", "... en
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -17,7 +18,7 @@ from distfsi.output.maps import Sheet, draw_maps, summary_colors
 from distfsi.output.panels import HISTORY_HEIGHT, WIDTH, draw_history, draw_profiles, profiles_height
 
 TIMES, RESOLUTION = 4, 110  # dots per inch
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.formatter.limits": (-3, 4),
@@ -44,7 +45,7 @@ def draw_summary(directory: Path) -> Path:
     with matplotlib.rc_context(STYLE):
         heights = [profiles_height(frames) if lines else sheet.height, HISTORY_HEIGHT]
         figure = Figure(figsize=(WIDTH, sum(heights)))
-        upper, lower = figure.subfigures(2, 1, height_ratios=heights, hspace=0.0)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=heights, hspace=0.0).ravel()
         if lines:
             draw_profiles(upper, frames)
         else:

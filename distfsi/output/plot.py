@@ -48,7 +48,7 @@ def plot(
         yield from _draw_gauges(directory, folder)
         return
     film = _open(directory, slice)
-    numbers = range(0, len(film), every)
+    numbers: Sequence[int] = range(0, len(film), every)
     if time is not None:
         numbers = [int(np.argmin(np.abs(np.array(film.times) - time)))]
     folder.mkdir(exist_ok=True)
@@ -85,7 +85,7 @@ def _save(figure: Figure, path: Path) -> Path:
 # ---- frames ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_lines(film: Film, numbers: Sequence[int], folder: Path, label: str, *_) -> Iterator[Path]:
+def _draw_lines(film: Film, numbers: Sequence[int], folder: Path, label: str, *_: object) -> Iterator[Path]:
     """Profiles of all fields, beside those of the first time, on axes that fit all times."""
     frames = dict(zip(numbers, film.frames(numbers), strict=True))
     first = next(film.frames([0]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from distfsi.output.fields import FieldWriter
 from distfsi.output.history import History
-from distfsi.output.interfaces import Origin
+from distfsi.output.interfaces import Budget, Origin, Performance, Simulation
 from distfsi.output.restart import RestartWriter, Snapshot
 from distfsi.output.schedule import Every
 from distfsi.output.storage import Storage
@@ -28,7 +28,14 @@ class Records:
     restart  path of the last restart file, or None
     """
 
-    def __init__(self, simulation, budget, performance, storage: Storage, origin: Origin | None):
+    def __init__(
+        self,
+        simulation: Simulation,
+        budget: Budget,
+        performance: Performance,
+        storage: Storage,
+        origin: Origin | None,
+    ):
         """Collective. `budget` gives the history its columns and rows, `performance` those of the file of its name.
         Raises OutputError on all ranks."""
         scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator

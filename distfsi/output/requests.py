@@ -51,11 +51,11 @@ class Requests:
         self.remove_stop_file()
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
-    def _note(self, *_) -> None:
+    def _note(self, *_: object) -> None:
         self._signaled = True
 
     def remove_stop_file(self) -> None:

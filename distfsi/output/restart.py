@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 from distfsi.errors import InputError
-from distfsi.output.interfaces import Blocks, Communicator
+from distfsi.output.interfaces import Blocks, Communicator, FilledBlocks
 from distfsi.output.storage import Piece, Storage, create_dataset, on_root, write_complete
 
 FORMAT = 2
@@ -152,7 +152,7 @@ class Restart:
             raise InputError([*faults, f"at a restart only these may change: {', '.join([*FREE, *REPORTED])}"])
         return list(changed.values())
 
-    def restore(self, parts: Mapping[str, Any], blocks: Blocks, communicator: Communicator) -> None:
+    def restore(self, parts: Mapping[str, Any], blocks: FilledBlocks, communicator: Communicator) -> None:
         """Collective. Bring back the parts that were kept; the others stay as they are.
 
         Raises InputError on all ranks when a part kept other things then than it keeps now.
@@ -213,7 +213,7 @@ def newest_restart(directory: Path) -> Path | None:
     return None
 
 
-def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: Blocks, _) -> np.ndarray:
+def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: FilledBlocks, _: Communicator) -> np.ndarray:
     """Own blocks; what lies beyond the last active cell stays as it is."""
     array = np.array(present)
     for block, origin, extent in zip(array, blocks.origin[:, ::-1], blocks.extent[:, ::-1], strict=True):
@@ -222,12 +222,12 @@ def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: Blocks, _) -
     return array
 
 
-def _read_particles(dataset: h5py.Dataset, _, __, communicator: Communicator) -> np.ndarray:
+def _read_particles(dataset: h5py.Dataset, _: np.ndarray, __: FilledBlocks, communicator: Communicator) -> np.ndarray:
     start, stop = (len(dataset) * rank // communicator.size for rank in (communicator.rank, communicator.rank + 1))
     return dataset[start:stop]
 
 
-def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _, communicator: Communicator) -> np.ndarray:
+def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _: FilledBlocks, communicator: Communicator) -> np.ndarray:
     counts = communicator.allgather(len(present))
     start = sum(counts[: communicator.rank])
     if sum(counts) == len(dataset):
@@ -238,7 +238,7 @@ def _read_sums(dataset: h5py.Dataset, present: np.ndarray, _, communicator: Comm
     return array
 
 
-def _read_values(dataset: h5py.Dataset, *_) -> np.ndarray:
+def _read_values(dataset: h5py.Dataset, *_: object) -> np.ndarray:
     return dataset[()]
 
 
@@ -258,7 +258,8 @@ def _flat(value: Any, key: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         if key:
             yield ".".join(key), type(value).__name__
         for field in fields(value):
-            yield from _flat(getattr(value, field.name), (*key, field.name))
+            if field.compare:
+                yield from _flat(getattr(value, field.name), (*key, field.name))
     elif isinstance(value, tuple) and any(is_dataclass(entry) or isinstance(entry, tuple) for entry in value):
         for number, entry in enumerate(value):
             yield from _flat(entry, (*key, getattr(entry, "name", str(number))))

@@ -28,9 +28,14 @@ class Point:
 
 
 def draw_scatter(
-    path: Path, title: str, x_label: str, y_label: str, points: Sequence[Point],
-    others: Sequence[Point] = (), lines: Sequence[tuple[float, str]] = (),
-) -> Path:  # fmt: skip
+    path: Path,
+    title: str,
+    x_label: str,
+    y_label: str,
+    points: Sequence[Point],
+    others: Sequence[Point] = (),
+    lines: Sequence[tuple[float, str]] = (),
+) -> Path:
     """Draw the points; `others` as crosses with letters, `lines` as named values of x; returns `path`."""
     groups = list(dict.fromkeys(point.group for point in points))
     with matplotlib.rc_context(STYLE):

@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -42,7 +43,9 @@ def storage(name: str, communicator: Communicator) -> Storage:
     if name == "mpio" and not h5py.get_config().mpi:
         remedy = 'launch/install-parallel-hdf5.sh builds one; "mpi-io" also writes from all ranks, and needs none'
         raise InputError([f'output.hdf5: "mpio" needs an h5py with parallel HDF5: {remedy}'])
-    return {"mpi-io": MpiIo, "mpio": ParallelHdf5, "gather": Gather}[name](communicator)
+    kinds: dict[str, type[MpiIo] | type[ParallelHdf5] | type[Gather]]
+    kinds = {"mpi-io": MpiIo, "mpio": ParallelHdf5, "gather": Gather}
+    return kinds[name](communicator)
 
 
 def parallel_hdf5() -> str:
@@ -83,7 +86,7 @@ def _unusable(directory: Path) -> str:
     except FileExistsError:
         return "it is a file"
     except OSError as error:
-        return error.strerror
+        return str(error.strerror)
 
 
 class MpiIo:
@@ -110,7 +113,7 @@ class Gather:
         layouts = on_root(self._communicator, path, lambda: _create(path, lay_down))
         for rank in range(self._communicator.size):
             received = self._communicator.bring(pieces, rank)
-            on_root(self._communicator, path, lambda received=received: _add(path, layouts, received))
+            on_root(self._communicator, path, partial(_add, path, layouts, received))
 
 
 class ParallelHdf5:
@@ -156,7 +159,7 @@ class Layout:
             return
         self._bytes = np.zeros([-(-n // c) for n, c in zip(dataset.shape, self._chunk, strict=True)], dtype=np.int64)
 
-        def note(stored) -> None:
+        def note(stored: Any) -> None:
             self._bytes[tuple(np.floor_divide(stored.chunk_offset, self._chunk))] = stored.byte_offset
 
         if hasattr(dataset.id, "chunk_iter"):
@@ -196,7 +199,7 @@ def _add(path: Path, layouts: Mapping[str, Layout], pieces: Sequence[Piece]) -> 
         for name, start, values in pieces:
             if values.size:
                 file.seek(layouts[name].offset(start))
-                file.write(np.ascontiguousarray(values))
+                file.write(np.ascontiguousarray(values).data)
 
 
 def _put(dataset: h5py.Dataset, start: Sequence[int], values: np.ndarray) -> None:

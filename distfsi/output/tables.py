@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from distfsi.narrowing import present
 from distfsi.output.panels import LEFT, LOGARITHMIC, TITLE, XLABEL, draw_legend, grid_of_panels
 from distfsi.output.progress import format_time
 from distfsi.output.scales import largest, norm_of, scaled
@@ -20,7 +22,7 @@ COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[xyz]{1,2}))?( \[(?P<unit>.*)\])?"
 Curves = dict[str, np.ndarray]
 
 
-def draw_gauge(name: str, table: Mapping[str, np.ndarray]) -> Figure:
+def draw_gauge(name: str, table: Mapping[str, Any]) -> Figure:
     """A panel for each quantity of a gauge's table, components of a vector in one panel."""
     table = dict(table)
     time = table.pop("time [s]")
@@ -59,7 +61,7 @@ def _groups(table: Mapping[str, np.ndarray]) -> dict[tuple[str, str], Curves]:
     """Curves by quantity and unit; those of one quantity by component."""
     groups: dict[tuple[str, str], Curves] = {}
     for column, values in table.items():
-        parts = COLUMN.fullmatch(column)
+        parts = present(COLUMN.fullmatch(column))
         groups.setdefault((parts["name"], parts["unit"] or ""), {})[parts["part"] or ""] = values
     return groups
 
@@ -73,9 +75,9 @@ def _along_line(
     points = int(np.count_nonzero(time == times[0]))
     distance = np.linalg.norm(position[:points] - position[0], axis=1)
     size, unit = scaled("m", largest([distance]))
-    groups = {}
+    groups: dict[tuple[str, str], Curves] = {}
     for column, values in table.items():
-        parts = COLUMN.fullmatch(column)
+        parts = present(COLUMN.fullmatch(column))
         name = parts["name"] + (f" {parts['part']}" if parts["part"] else "")
         groups[name, parts["unit"] or ""] = {format_time(t): values[time == t] for t in chosen}
     return distance / size, f"distance [{unit}]", groups, [format_time(t) for t in chosen]

@@ -27,9 +27,14 @@ class VerdictMap:
 
 
 def draw_verdicts(
-    path: Path, title: str, maps: Sequence[VerdictMap], rows: tuple[str, Sequence[str]],
-    columns: tuple[str, Sequence[str]], colors: Mapping[str, str], across: int = 4,
-) -> Path:  # fmt: skip
+    path: Path,
+    title: str,
+    maps: Sequence[VerdictMap],
+    rows: tuple[str, Sequence[str]],
+    columns: tuple[str, Sequence[str]],
+    colors: Mapping[str, str],
+    across: int = 4,
+) -> Path:
     """Draw maps side by side; returns `path`. `rows` and `columns`: a label and names; `colors`: of verdict 0, 1 …"""
     across = min(across, max(2, len(maps)))  # two leave room for the legend
     down = -(-len(maps) // across)

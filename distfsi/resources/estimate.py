@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 from scipy import ndimage, optimize
 
-from distfsi.fluid.fluid import SSP_RK3
 from distfsi.fluid.model import fluid_model
+from distfsi.fluid.stages import SSP_RK3
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
 from distfsi.mesh.blocks import Blocks
@@ -135,11 +135,11 @@ class Resources:
 
     def _coupling_bytes(self, value: int) -> int:
         """Per cell, of values of so many bytes: what it is and the impulse on it; and what cuts it."""
-        D, paper = self.dimensions, 1 + FLOAT * self.dimensions
-        if self.scene.coupling.scheme == "paper":
-            return paper
+        D, every = self.dimensions, 1 + FLOAT * self.dimensions
+        if self.scene.coupling.scheme == "immersed_boundary":
+            return every
         swept = 3 if len(present(self.scene.fluid).phases) == 2 else 1
-        return paper + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
+        return every + 2 + D + 2 * FLOAT + (swept + 2 + 2 * D) * value  # corners are counted as cells
 
     # ---- files -------------------------------------------------------------------------------------------------------
 

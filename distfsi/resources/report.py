@@ -40,6 +40,7 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("steps", _steps(resources)),
         _line("time", _time(resources, threads, bench)),
     ]
+    lines += [_line("note", text) for text in scene.notes]
     return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
 
 

@@ -25,7 +25,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     if scene.output.fields_every > scene.time.end:
         yield "output.fields_every is longer than the run: only the first and the last fields are written"
     if layout:
-        yield from _absent_phases(scene.fluid, layout)
+        yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
     yield from warnings(scene)
     for body in _bodies(scene):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from distfsi.laws.law import Source
 from distfsi.laws.sources.gravity import Gravity
+from distfsi.narrowing import present
 from distfsi.scene.description import (
     Body,
     Coupling,
@@ -58,13 +59,13 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         Region(_state(region, phases, dimensions), region.shape.build() if region.shape else None)
         for region in given.regions
     )
-    inflow = tuple(
-        tuple(
-            _state(state, phases, dimensions) if (state := getattr(given.inflow, f"{axis}_{side}")) else None
-            for side in SIDES
-        )
-        for axis in AXES[:dimensions]
-    )
+
+    def at(axis: str, side: str) -> FluidState | None:
+        state = getattr(given.inflow, f"{axis}_{side}")
+        return _state(state, phases, dimensions) if state else None
+
+    low, high = SIDES
+    inflow = tuple((at(axis, low), at(axis, high)) for axis in AXES[:dimensions])
     return Fluid(
         phases,
         regions,
@@ -83,7 +84,7 @@ def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> Flu
     index = [phase.name for phase in phases].index(given.phase)
     p = given.pressure
     if p is None:
-        p = pressure(phases[index].eos, given.density, given.energy)
+        p = pressure(phases[index].eos, given.density, present(given.energy))
     return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
 
 
@@ -109,8 +110,8 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
         for name, body in given.bodies.items()
     )
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
-    form = (given.objective_rate, given.form, given.zero_energy, given.artificial_stress)
-    return Solid(bodies, given.smoothing, *viscosity, *form)
+    form = (given.objective_rate, given.form)
+    return Solid(bodies, given.smoothing, *viscosity, *form, given.zero_energy, given.artificial_stress)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

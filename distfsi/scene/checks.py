@@ -54,16 +54,16 @@ def check(
 
     `present`: names of the sections of the input, the invalid ones among them.
     """
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_fluid(sections.fluid, fluid)
-    if domain is None:
+    if domain is None or sections.domain is None:
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself
-    if fluid is not None:
+    if fluid is not None and sections.fluid is not None:
         yield from check_inflow(sections.fluid, domain)
         if (level := fluid.hydrostatic_level) is not None:
             yield from check_rest(level, fluid, domain, build_sources(sections.domain.gravity, sections.sources))
@@ -239,7 +239,7 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
         case shape:
             lower, upper = bounding_box(shape)
-            extents = np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower)
+            extents = list(np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower))
     return math.prod(max(float(extent), 0.0) / body.spacing for extent in extents)
 
 
@@ -269,7 +269,7 @@ def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) ->
 
 def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:
     """Bodies in a fluid are tight, and faces look no farther than to the next cells."""
-    if given.drop_below is not None and given.scheme == "paper":
+    if given.drop_below is not None and given.scheme == "immersed_boundary":
         yield Fault(("coupling", "drop_below"), "needs scheme 'cut_cells'")
     if fluid.reconstruction == "weno5":
         yield Fault(("fluid", "reconstruction"), "'weno5' looks past the cells beside a solid; expected another")

@@ -20,7 +20,7 @@ TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
-CouplingScheme = Literal["cut_cells", "stairs", "paper"]
+CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
 
 
@@ -264,7 +264,7 @@ class Performance:
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene."""
+    """A checked scene. `notes`: what its input should be told in other words."""
 
     title: str
     domain: Domain
@@ -276,3 +276,4 @@ class Scene:
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from distfsi.scene.faults import Fault, Path, nearest, one_of
@@ -15,7 +15,7 @@ _LIMITS = {"greater_than": "> {gt:g}", "greater_than_equal": ">= {ge:g}", "less_
 _LIMITS["less_than_equal"] = "<= {le:g}"
 
 
-def diagnose(errors: list[dict[str, Any]], data: Json, schema: Json) -> list[Fault]:
+def diagnose(errors: Sequence[Any], data: Json, schema: Json) -> list[Fault]:
     """pydantic's `errors` about `data` as faults; the JSON `schema` knows the right words.
 
     A key that is missing because it is misspelt is told once.
@@ -75,7 +75,8 @@ def _describe(error: dict[str, Any], path: Path, data: Json, schema: Json) -> Fa
 
 def _at(path: Path, data: Any) -> Any:
     for step in path:
-        data = data.get(step) if isinstance(data, dict) else dict(enumerate(data)).get(step)
+        items: dict[Any, Any] = data if isinstance(data, dict) else dict(enumerate(data))
+        data = items.get(step)
     return data
 
 

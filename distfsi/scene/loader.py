@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path as File
 from typing import Any
@@ -11,10 +12,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from distfsi.errors import InputError
-from distfsi.scene import build, checks
+from distfsi.scene import build, checks, materials
 from distfsi.scene.description import Scene
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
+from distfsi.scene.former import replace_former_words
 from distfsi.scene.overrides import TABLES, apply
 from distfsi.scene.schema import Input, Sections, context_of
 
@@ -31,13 +33,15 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     file = File(path)
     text, data = _read(file)
     overridden, faults = apply(data, overrides)
+    notes = replace_former_words(data)
+    unnamed, incomplete = materials.fill(data)
     sections, invalid = validate(data)
     scene, crossed = _assemble(sections, data, file.stem)
-    faults += invalid + crossed
-    if faults:
-        locations = Locations(file.name, text, overridden)
+    faults += unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
+    locations = Locations(file.name, text, overridden)
+    if faults or scene is None:
         raise InputError(locations.tell(faults))
-    return scene
+    return replace(scene, notes=tuple(locations.tell(notes)))
 
 
 @cache
@@ -68,6 +72,10 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
         raise InputError([f"{file}: is no TOML: {cause}"]) from error
     except RecursionError as error:
         raise InputError([f"{file}: is no TOML: brackets in too many brackets"]) from error
+
+
+def _inside(path: Path, tables: Sequence[Path]) -> bool:
+    return any(path[: len(table)] == table for table in tables)
 
 
 def validate(data: dict[str, Any]) -> tuple[Sections, list[Fault]]:
@@ -111,7 +119,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))
-    if faults or not isinstance(sections, Input):
+    if faults or domain is None or not isinstance(sections, Input):
         return None, faults
     scene = Scene(
         title=sections.title or stem,

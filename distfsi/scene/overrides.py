@@ -8,8 +8,11 @@ from typing import Any
 
 from distfsi.scene.faults import Fault, Path, dotted, one_of
 
-NAMED = {("fluid", "phases"): "phase", ("solid", "bodies"): "body"}  # tables of names, which an override cannot add to
-TABLES = {*NAMED, ("gauges",), ("sources",)}  # all tables of names
+NAMED: dict[Path, str] = {
+    ("fluid", "phases"): "phase",
+    ("solid", "bodies"): "body",
+}  # tables of names, which an override cannot add to
+TABLES: set[Path] = {*NAMED, ("gauges",), ("sources",)}  # all tables of names
 SHOWN = 100  # letters of a setting in a fault
 REMOVED = "none"  # the value that removes a table
 

@@ -18,15 +18,15 @@ def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tupl
     the domain, a Tube (2D) and a Cylinder rings, unless the body asks for the other. Lattice and rings leave planes
     through the center between particles.
     """
-    lower, upper = np.asarray(lower), np.asarray(upper)
+    low_end, high_end = np.asarray(lower), np.asarray(upper)
     match body.shape:
         case Box(low, high) if body.lattice_angle == 0.0:
-            positions, each = _fill(np.maximum(low, lower), np.minimum(high, upper), body.spacing)
+            positions, each = _fill(np.maximum(low, low_end), np.minimum(high, high_end), body.spacing)
             return positions, np.full(len(positions), each)
         case HalfSpace():
-            return _half_space(body.shape, lower, upper, body.spacing)
+            return _half_space(body.shape, low_end, high_end, body.spacing)
     positions, volumes = _in_rings(body) if uses_rings(body) else _in_lattice(body)
-    inside = np.all((positions > lower) & (positions < upper), axis=1)
+    inside = np.all((positions > low_end) & (positions < high_end), axis=1)
     return positions[inside], volumes[inside]
 
 
@@ -75,6 +75,7 @@ def _fill(lower: np.ndarray, upper: np.ndarray, spacing: float) -> tuple[np.ndar
 def _in_lattice(body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Particles of a cubic lattice that lie in the shape; a turned one turns about z, in a cylinder about its axis."""
     shape, spacing = body.shape, body.spacing
+    assert not isinstance(shape, HalfSpace)
     if isinstance(shape, Cylinder):
         points, _ = _layers(shape, _square(2, shape.radius, spacing, body.lattice_angle), spacing)
     else:
@@ -147,6 +148,8 @@ def _in_rings(body: Body) -> tuple[np.ndarray, np.ndarray]:
             section, areas = _rings(inner, outer, body.spacing)
             positions, height = _layers(body.shape, section, body.spacing)
             return positions, np.tile(areas * height, len(positions) // len(section))
+        case shape:
+            raise TypeError(f"no rings fill a {type(shape).__name__}")
 
 
 def _rings(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:

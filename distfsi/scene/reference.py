@@ -28,7 +28,8 @@ An input is a TOML file with `[domain]`, `[time]`, and `[fluid]`, `[solid]` or b
   --set fluid.regions.1.density="1600 kg/m3"`; numbers in a path count the elements of a list from 0.
 * All faults are told at once, each with its key, its line, what was expected and the nearest right word.
 
-Keys without a default are needed.
+Keys without a default are needed. A phase of the fluid or a body with a `material` takes what it leaves out from the
+data of the package: `distfsi materials` lists the names, `distfsi materials TNT` shows one with its sources.
 """
 
 
@@ -42,7 +43,7 @@ SECTIONS = {
     "`[domain]`": ("DomainInput",),
     "`[time]`": ("TimeInput",),
     "`[fluid]`": ("FluidInput",),
-    "`[fluid.phases.NAME]`": _names(FluidEos),
+    "`[fluid.phases.NAME]`": ("NamedPhase", *_names(FluidEos)),
     "`[[fluid.regions]]`": ("RegionInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
@@ -81,18 +82,19 @@ def json_schema() -> str:
 
 
 def _table(definition: Json) -> Iterator[str]:
-    required = definition.get("required", ())
-    rows = [_row(key, node, key in required) for key, node in definition["properties"].items()]
+    needed = dict.fromkeys(definition.get("required", ()), "needed")
+    needed |= dict.fromkeys(definition.get("from_material", ()), "needed, or the material's")
+    rows = [_row(key, node, needed.get(key)) for key, node in definition["properties"].items()]
     rows = [row for row in rows if row]
     yield from TABLE_HEAD + rows if rows else ()
 
 
-def _row(key: str, node: Json, required: bool) -> str:
+def _row(key: str, node: Json, needed: str | None) -> str:
     """One key; sections, which have headings of their own, give no row."""
     if "description" not in node and "const" not in node:
         return ""
     default = node.get("default")
-    shown = "needed" if required else "" if default is None or isinstance(default, dict) else f"`{_toml(default)}`"
+    shown = needed or ("" if default is None or isinstance(default, dict) else f"`{_toml(default)}`")
     return f"| `{key}` | {_values(node)} | {shown} | {node.get('description', 'chooses this one')} |"
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.law_tables import FailureInput, GaugeInput, PhaseInput, SolidEosInput, SourceInput, StrengthInput
+from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
+from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
     Acceleration,
@@ -31,7 +32,7 @@ Ends = Annotated[
     tuple[description.BoundaryKind, description.BoundaryKind],
     Field(description="kind of the low and of the high end"),
 ]
-OUTFLOW = ("outflow", "outflow")
+OUTFLOW: tuple[description.BoundaryKind, description.BoundaryKind] = ("outflow", "outflow")
 
 
 class DomainInput(Table):
@@ -62,7 +63,10 @@ class TimeInput(Table):
 
 
 class StateInput(Table):
-    """State of a phase, and how much of the other there is in it; give its pressure or its energy."""
+    """State of a phase, and how much of the other there is in it; give its pressure or its energy. What a state of a
+    phase with a `material` leaves out is the material's at rest, of an explosive with all its energy released."""
+
+    model_config = from_material("density")
 
     phase: PhaseName = Field(description="name of the phase")
     density: Density = Field(description="density of the phase")
@@ -101,7 +105,7 @@ class InflowInput(Table):
 class FluidInput(Table):
     """The compressible flow of one or two phases, numbered in order of appearance."""
 
-    phases: dict[str, PhaseInput] = Field(
+    phases: dict[str, NamedPhaseInput] = Field(
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
@@ -130,16 +134,28 @@ class FluidInput(Table):
 # ---- solid -----------------------------------------------------------------------------------------------------------
 
 
+def _none_as_absent(value: Any) -> Any:
+    return None if value == "none" else value
+
+
 class BodyInput(Table):
     """A solid body packed with particles."""
 
+    model_config = from_material("density", "eos", "strength")
+
+    material: str | None = Field(
+        None, description="name of a solid material (`distfsi materials`); the next keys change it"
+    )
     shape: Shape = Field(description="box, ball, half_space (cut to the domain), tube or cylinder")
     spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
     density: Density = Field(description="density at rest")
     velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
     eos: SolidEosInput = Field(description="pressure law")
     strength: StrengthInput = Field(description='strength model, or "none"')
-    failure: FailureInput | None = Field(None, description="what breaks it; default nothing")
+    failure: Annotated[
+        FailureInput | None,
+        BeforeValidator(_none_as_absent, json_schema_input_type=FailureInput | Literal["none"] | None),
+    ] = Field(None, description='what breaks it, or "none"; default that of the material, if it has a name and one')
     fixed: Shape | None = Field(None, description="particles that start in here keep fixed_velocity")
     fixed_velocity: Velocity | None = Field(None, description="velocity of the fixed particles; default at rest")
     radial_velocity: quantity("m/s") = Field(
@@ -229,13 +245,13 @@ class CouplingInput(Table):
 
     scheme: description.CouplingScheme = Field(
         "cut_cells",
-        description='"cut_cells": conservative, tight and quiet; "stairs": the same with whole cells only, to compare '
-        'with: its forces on oblique walls are rough; "paper": covered cells copy the fluid',
+        description='"cut_cells": conservative, and walls do not leak; "staircase": the same with whole cells only, to '
+        'compare with: its forces on oblique walls are rough; "immersed_boundary": covered cells copy the fluid',
     )
     sub_steps: Annotated[int, Field(strict=True, ge=1)] = Field(
         8,
         description="most steps that the solid makes within one of the fluid, where its own must be shorter; "
-        '1 with "paper"',
+        '1 with "immersed_boundary"',
     )
     drop_below: quantity("Pa", gt=0.0) | None = Field(
         None,

@@ -67,12 +67,12 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
             reach = radius * np.sqrt(np.maximum(1.0 - axis**2, 0.0))  # of its round faces
             return tuple(np.minimum(start, end) - reach), tuple(np.maximum(start, end) + reach)
         case HalfSpace(point, normal):
-            lower, upper = [-math.inf] * len(point), [math.inf] * len(point)
+            low, high = [-math.inf] * len(point), [math.inf] * len(point)
             axes = [d for d, n in enumerate(normal) if n != 0.0]
             if len(axes) == 1:
                 (d,) = axes
-                (upper if normal[d] > 0.0 else lower)[d] = point[d]
-            return tuple(lower), tuple(upper)
+                (high if normal[d] > 0.0 else low)[d] = point[d]
+            return tuple(low), tuple(high)
 
 
 def volume(shape: Box | Ball | Tube | Cylinder) -> float:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from distfsi.narrowing import present
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene, Shape
 from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.shapes import contains, distance
@@ -38,7 +39,7 @@ class Layout:
 
     def __init__(self, scene: Scene):
         domain = scene.domain
-        self.domain, self.fluid = domain, scene.fluid
+        self.domain, self.fluid = domain, present(scene.fluid)
         counts = [min(n, SAMPLES[domain.dimensions]) for n in domain.cells]
         ends = zip(domain.lower, domain.upper, counts, strict=True)
         self.centers = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in ends]
@@ -46,7 +47,7 @@ class Layout:
         grids = np.meshgrid(*reversed(self.centers), indexing="ij")
         points = np.stack([grid.ravel() for grid in reversed(grids)], axis=1)
         region = np.zeros(len(points), dtype=np.int64)
-        for number, part in enumerate(scene.fluid.regions):
+        for number, part in enumerate(self.fluid.regions):
             if part.shape is not None:
                 region[self._inside(part.shape, points)] = number
         reach = 0.5 * math.hypot(*self.spacing)
@@ -71,14 +72,16 @@ class Layout:
         for axis in range(self.domain.dimensions):
             lower, upper = self.neighbours(axis)
             meeting = (lower != upper) & (lower != COVERED) & (upper != COVERED)
-            for first, second in np.unique(np.stack([lower[meeting], upper[meeting]]), axis=1).T:
+            for first, second in np.unique(np.stack([lower[meeting], upper[meeting]]), axis=1).T.tolist():
                 yield Contact(axis, self.fluid.regions[first].state, self.fluid.regions[second].state)
 
     def _at_inflows(self) -> Iterator[Contact]:
         for axis, sides in enumerate(self.fluid.inflow):
             for side, state in enumerate(sides):
-                edge = self.region.take(-side, axis=self.region.ndim - 1 - axis)
-                for number in np.unique(edge[edge != COVERED]) if state else ():
+                if state is None:
+                    continue
+                edge = np.asarray(self.region.take(-side, axis=self.region.ndim - 1 - axis))
+                for number in np.unique(edge[edge != COVERED]).tolist():
                     inner = self.fluid.regions[number].state
                     yield Contact(axis, inner, state) if side else Contact(axis, state, inner)
 
@@ -126,9 +129,9 @@ def _sound(fluid: Fluid, state: FluidState) -> float:
 
 def fastest_signal(scene: Scene, layout: Layout) -> float:
     """Largest |u| + c [m/s] in the fluid and in the bodies until waves reflect."""
-    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
-    for state in states(scene.fluid):
-        speeds.append(math.hypot(*state.velocity) + _sound(scene.fluid, state))
+    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(layout.fluid, c)]
+    for state in states(layout.fluid):
+        speeds.append(math.hypot(*state.velocity) + _sound(layout.fluid, state))
     for body in scene.solid.bodies if scene.solid else ():
         speeds.append(math.hypot(*body.velocity) + solid_sound(body))
     return max(speeds)
@@ -139,12 +142,13 @@ def moving_share(scene: Scene, layout: Layout) -> float:
     the first wave comes."""
     if scene.sources:
         return 1.0
-    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(scene.fluid, c)]
-    speed = max(speeds) if speeds else max(_sound(scene.fluid, state) for state in states(scene.fluid))
+    speeds = [abs(wave.velocity) + wave.sound for c in layout.contacts for wave in waves(layout.fluid, c)]
+    speed = max(speeds) if speeds else max(_sound(layout.fluid, state) for state in states(layout.fluid))
     if not layout.sources.any():
         return 0.0
     arrival = distance_transform_edt(~layout.sources, sampling=layout.spacing[::-1]) / speed
-    sizes = zip(scene.performance.tile_cells, scene.domain.cells, layout.region.shape[::-1], strict=True)
+    points_along: tuple[int, ...] = layout.region.shape[::-1]
+    sizes = zip(scene.performance.tile_cells, scene.domain.cells, points_along, strict=True)
     for axis, (tile, cells, points) in enumerate(sizes):
         edges = np.unique(np.arange(0, cells, tile) * points // cells)
         along = layout.region.ndim - 1 - axis
@@ -174,7 +178,7 @@ def sub_steps(scene: Scene, layout: Layout | None) -> float:
 def _step_rate(scene: Scene, layout: Layout | None) -> float:
     """1/dt [1/s]."""
     rate = fluid_rate(scene, layout) / scene.time.cfl if layout else 0.0
-    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "paper" else 1
+    parts = scene.coupling.sub_steps if layout and scene.coupling.scheme != "immersed_boundary" else 1
     return max(rate, _solid_rate(scene) / parts)
 
 
@@ -185,8 +189,8 @@ def _solid_rate(scene: Scene) -> float:
 
 def fluid_rate(scene: Scene, layout: Layout) -> float:
     """max sum_d (|u_d| + c)/h_d [1/s] over the states of the start and those that form where they meet."""
-    fluid, domain = scene.fluid, scene.domain
-    rates = []
+    fluid, domain = layout.fluid, scene.domain
+    rates: list[float] = []
     for state in states(fluid):
         sound = _sound(fluid, state)
         rates.append(sum((abs(u) + sound) / h for u, h in zip(state.velocity, domain.spacing, strict=True)))
@@ -205,7 +209,7 @@ def solid_rate(scene: Scene, body: Body) -> float:
 
     With bonds only a shock is viscous, not all there is.
     """
-    solid, c = scene.solid, solid_sound(body)
+    solid, c = present(scene.solid), solid_sound(body)
     alpha = solid.viscosity_alpha if solid.form_of(body) == "updated_lagrangian" else 0.0
     closing = (math.dist(body.velocity, other.velocity) for other in solid.bodies)
     faster, volume = body.eos.behind_shock(0.5 * max(closing))

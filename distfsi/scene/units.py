@@ -11,7 +11,7 @@ import math
 import re
 from fractions import Fraction
 
-Dimension = tuple[int, int, int, int]
+Dimension = tuple[int, ...]
 Unit = tuple[Fraction, Dimension]
 
 NUMBER = (0, 0, 0, 0)

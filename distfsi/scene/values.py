@@ -6,7 +6,7 @@ names are checked where they stand.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -39,7 +39,8 @@ def quantity(unit: str, **limits: float) -> Any:
     """Type of a number in `unit` within pydantic's `limits` (gt, ge, lt, le), given in SI or as a text with a unit."""
     words = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
     shown = {"type": ["number", "string"], "unit": unit} | {words[key]: limit for key, limit in limits.items()}
-    return Annotated[float, Field(**limits), BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(shown)]
+    field: Any = Field(**cast(Any, limits))
+    return Annotated[float, field, BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(shown)]
 
 
 def vector(unit: str) -> Any:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.device.fold import Bound
+from distfsi.device.source import Bound
 from distfsi.laws.law import Column, Failure, Law, SolidEos, Strength
 from distfsi.laws.solid.scatter import Scatter
 from distfsi.scene.description import Body, Solid

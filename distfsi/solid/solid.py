@@ -68,18 +68,18 @@ class Solid:
     given    (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step
     """
 
-    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, team: Device):
-        self.blocks, self.communicator, self.team = blocks, communicator, team
+    def __init__(self, scene: Scene, blocks: Blocks, communicator: Communicator, device: Device):
+        self.blocks, self.communicator, self.device = blocks, communicator, device
         self.dimensions = D = scene.domain.dimensions
         self._scene = solid = present(scene.solid)
         self.materials = Materials(solid, D)
         self._vector = tuple((a,) for a in range(D))  # the axes whose reflection changes the sign of each component
         self.body_force = BodyForce(scene.sources, D)
         constants = self._constants()
-        self.kernels = team.build(DRIVERS, constants)
-        self._points = MaterialGroups(self.materials, team, constants)
+        self.kernels = device.build(DRIVERS, constants)
+        self._points = MaterialGroups(self.materials, device, constants)
         self._von_mises = plain(von_mises, constants)
-        self.exchange = ParticleExchange(blocks, team, self.kernels)
+        self.exchange = ParticleExchange(blocks, device, self.kernels)
         self.form = self._form(scene)
         # Sums over all steps, and of the last one.
         self._boundary_impulse = np.zeros((blocks.local_count, D))
@@ -88,8 +88,8 @@ class Solid:
         self.given = np.zeros((blocks.local_count, len(solid.bodies), D))
         # What prepare() finds.
         self._near: Near | None = None
-        self._acceleration, self._limits = team.empty((0, D)), team.empty((0, len(LIMITS)))
-        self.start, self.before, self.carried = (team.empty((0, D)) for _ in range(3))
+        self._acceleration, self._limits = device.empty((0, D)), device.empty((0, len(LIMITS)))
+        self.start, self.before, self.carried = (device.empty((0, D)) for _ in range(3))
         self.sub_steps = 0
         self._shown: list[str] = []  # columns of others that field files show
         # What migrate() finds: the block of each particle, and the particles by block, body and id.
@@ -98,9 +98,9 @@ class Solid:
         self._groups: Groups | None = None
         # The particles of this rank's blocks.
         c = self._own_particles(scene)
-        self.columns = Columns(team, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
+        self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
-        self._points.deform(self.columns, 0.0, team.zeros((self.count, D**2)))
+        self._points.deform(self.columns, 0.0, device.zeros((self.count, D**2)))
         self.form.bind(self.columns, self.exchange)
 
     def _constants(self) -> dict[str, object]:
@@ -118,12 +118,12 @@ class Solid:
         } | self.materials.constants
 
     def _form(self, scene: Scene) -> SolidForm:
-        solid, search = self._scene, NeighbourSearch(self.kernels, self.team, scene.domain.lower, scene.domain.upper)
+        solid, search = self._scene, NeighbourSearch(self.kernels, self.device, scene.domain.lower, scene.domain.upper)
         if any(solid.form_of(body) == "total_lagrangian" for body in solid.bodies):
             given = (self.communicator, solid, self._points, self.dimensions)
             return TotalLagrangian(self.kernels, self.exchange, search, *given)
         repels = solid.artificial_stress > 0.0
-        return UpdatedLagrangian(self.kernels, self.team, search, self.dimensions, repels)
+        return UpdatedLagrangian(self.kernels, self.device, search, self.dimensions, repels)
 
     def _own_particles(self, scene: Scene) -> dict[str, np.ndarray]:
         """The columns of the particles in this rank's blocks."""
@@ -140,7 +140,7 @@ class Solid:
         has begun goes on with another sub-step; `stray` [m]: how far particles go between two calls of migrate(), if
         there are such. Raises Diverged on all ranks when a smoothing length is not finite.
         """
-        c, device, own = self.columns, self.team, self.count
+        c, device, own = self.columns, self.device, self.count
         (h,) = c.read("h")
         largest = self.exchange.rows.largest(h, 0.0)
         maxima = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
@@ -184,7 +184,7 @@ class Solid:
 
     def kick(self, dt: float) -> None:
         """After prepare(). Give the particles the velocities after `dt` [s] of the forces between them and gravity."""
-        c, budget = self.columns, self.team.empty((self.count, 1 + self.dimensions))
+        c, budget = self.columns, self.device.empty((self.count, 1 + self.dimensions))
         given = (*c.read("mass", "fixed"), self._acceleration, *c.write("velocity"), budget)
         self._run(self.kernels.kick, dt, *given)
         sums = self._per_body(budget).sum(axis=1)
@@ -193,7 +193,7 @@ class Solid:
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
-        c, device, D = self.columns, self.team, self.dimensions
+        c, device, D = self.columns, self.device, self.dimensions
         (velocity,) = c.read("velocity")
         (around,) = self.around.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
@@ -211,7 +211,7 @@ class Solid:
         Returns by how much (own, D) [m/s], another one, the velocity at which the impulse works on each particle, the
         mean of before and after, exceeds the one that carried it.
         """
-        c, device, D = self.columns, self.team, self.dimensions
+        c, device, D = self.columns, self.device, self.dimensions
         excess, budget = device.empty((self.count, D)), device.empty((self.count, 2 + D))
         given = (*c.read("mass", "fixed"), self.carried, *c.write("velocity"), excess, budget)
         self._run(self.kernels.apply_impulse, impulse, *given)
@@ -232,7 +232,7 @@ class Solid:
         group = self._block * bodies + self.columns["body"]
         self._order = np.lexsort((self.columns["id"], group))
         sizes = np.bincount(group, minlength=self.blocks.local_count * bodies)
-        self._groups = Groups(self.team, self.kernels, sizes, self._order)
+        self._groups = Groups(self.device, self.kernels, sizes, self._order)
 
     def attach_column(self, name: str, values: np.ndarray, shown: bool) -> None:
         """A column (own, …) of a coupling's own: it goes with the particles to other ranks and into restart files, and
@@ -246,7 +246,7 @@ class Solid:
         return {name: self.columns[name][self._order] for name in names}
 
     def _run(self, kernel: Any, *arguments: Any) -> None:
-        self.team.run(kernel, self.count, *arguments)
+        self.device.run(kernel, self.count, *arguments)
 
     # ---- totals and output ------------------------------------------------------------------------------------------
 
@@ -281,7 +281,7 @@ class Solid:
         kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
         sums = (mass, kinetic, mass * c["energy"], mass * c["sound_speed"])
         values = np.column_stack([*sums, mass[:, None] * velocity])
-        total = self.blocks.sum(self._per_body(self.team.array(values)).sum(axis=1))
+        total = self.blocks.sum(self._per_body(self.device.array(values)).sum(axis=1))
         return dict(zip(("mass", "kinetic", "internal", "acoustic"), total, strict=False)) | {"momentum": total[4:]}
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
@@ -290,7 +290,7 @@ class Solid:
         c, D = self.columns, self.dimensions
         mass = c["mass"][:, None]
         values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
-        amounts = self._per_body(self.team.array(values))
+        amounts = self._per_body(self.device.array(values))
         total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
         mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
         return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}

@@ -116,19 +116,42 @@ def _profile(simulation: Simulation, variable: int) -> tuple[np.ndarray, np.ndar
 
 
 PISTON = Problem(
-    "piston", "Piston through gas at rest (force, noise, pressure, mass)", "gas_piston.toml", piston, ("piston",), 3.0,
-    (0.04, 0.02, 0.01), ("performance.block_cells=512",),
-)  # fmt: skip
+    "piston",
+    "Piston through gas at rest (force, noise, pressure, mass)",
+    "gas_piston.toml",
+    piston,
+    ("piston",),
+    3.0,
+    (0.04, 0.02, 0.01),
+    ("performance.block_cells=512",),
+)
 FREE_PLATE = Problem(
-    "free_plate", "Free plate driven by gas (velocity, mass)", "free_plate.toml", free_plate, ("plate",), 4.0,
+    "free_plate",
+    "Free plate driven by gas (velocity, mass)",
+    "free_plate.toml",
+    free_plate,
+    ("plate",),
+    4.0,
     (0.1, 0.05, 0.025),
-)  # fmt: skip
+)
 TAYLOR_PLATE = Problem(
-    "taylor_plate", "Taylor's plate in water (largest velocity, its time)", "taylor_plate.toml", taylor_plate,
-    ("driver", "plate"), 0.5, (0.01, 0.005),
-)  # fmt: skip
+    "taylor_plate",
+    "Taylor's plate in water (largest velocity, its time)",
+    "taylor_plate.toml",
+    taylor_plate,
+    ("driver", "plate"),
+    0.5,
+    (0.01, 0.005),
+)
 TUBE = Problem(
-    "tube", "Steel tube at 10 us (radius, velocity)", "steel_tube.toml", tube, ("tube",), 0.06, (2e-3, 1e-3),
-    ("solid.form=total_lagrangian", "solid.bodies.tube.strength=none", "domain.upper=[0.06,0.06]", "time.end=1e-5"), 2,
-)  # fmt: skip
+    "tube",
+    "Steel tube at 10 us (radius, velocity)",
+    "steel_tube.toml",
+    tube,
+    ("tube",),
+    0.06,
+    (2e-3, 1e-3),
+    ("solid.form=total_lagrangian", "solid.bodies.tube.strength=none", "domain.upper=[0.06,0.06]", "time.end=1e-5"),
+    2,
+)
 PROBLEMS = (PISTON, FREE_PLATE, TAYLOR_PLATE, TUBE)

@@ -72,14 +72,27 @@ def ring(rate: float, thickness: float, rows: int, failure: Failure | None) -> S
     """A quarter of a ring that expands at a rate [1/s]; its symmetry planes stand for the rest."""
     shape = Tube((0.0, 0.0), RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness)
     body = Body(
-        "ring", shape, thickness / rows, DENSITY, (0.0, 0.0), EOS, STRENGTH, None, failure,
+        "ring",
+        shape,
+        thickness / rows,
+        DENSITY,
+        (0.0, 0.0),
+        EOS,
+        STRENGTH,
+        None,
+        failure,
         radial_velocity=rate * RADIUS,
-    )  # fmt: skip
+    )
     size = 4.0 * RADIUS
     scene = Scene(
-        "ring", Domain((0.0, 0.0), (size, size), (8, 8), (("symmetry", "outflow"),) * 2), Time(1.0, 0.5, None),
-        None, Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
-    )  # fmt: skip
+        "ring",
+        Domain((0.0, 0.0), (size, size), (8, 8), (("symmetry", "outflow"),) * 2),
+        Time(1.0, 0.5, None),
+        None,
+        Solid((body,), 1.3, 0.5, 1.0),
+        Output("", 0.0, 1),
+        Performance((8, 8), (8, 8)),
+    )
     return Simulation.of(scene, Communicator(), 1)
 
 

@@ -11,7 +11,8 @@ from distfsi.study.couplings import FREE_PLATE, PISTON, PROBLEMS, Problem
 from distfsi.study.frontier import Frontier
 
 DIRECTORY = Path("out/study_frontier_coupling")
-SCHEMES, PER_CELL = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}, (1.4, 2.0, 4.0)
+SCHEMES = {"cut cells": "cut_cells", "staircase": "staircase", "immersed boundary": "immersed_boundary"}
+PER_CELL = (1.4, 2.0, 4.0)
 VARIANTS = {f"{name}, {n:g} per cell": (scheme, n) for name, scheme in SCHEMES.items() for n in PER_CELL}
 
 
@@ -25,7 +26,7 @@ def quick(communicator: Communicator, overrides: Sequence[str]) -> None:
     """Both schemes with two particles to a cell on the coarsest cells."""
     problems = {PISTON: 1, FREE_PLATE: 1}
     Frontier("frontier coupling", DIRECTORY, start).run(
-        communicator, ("cut cells, 2 per cell", "paper, 2 per cell"), problems, overrides
+        communicator, ("cut cells, 2 per cell", "immersed boundary, 2 per cell"), problems, overrides
     )
 
 

@@ -171,10 +171,14 @@ def draw(problem: Problem, outcomes: Sequence[Outcome], scene: Scene) -> None:
     lines = () if known or len(present(scene.fluid).phases) == 1 else peer_lines(problem, outcomes[0])
     per_row = " per row" if problem.rows else ""
     draw_scatter(
-        DIRECTORY / f"{problem.name}.png", f"{problem.title}: default {outcomes[0].cells} cells along x",
-        f"seconds of one core{per_row}", "mean relative L1 error of density, velocity and pressure",
-        points, others, lines,
-    )  # fmt: skip
+        DIRECTORY / f"{problem.name}.png",
+        f"{problem.title}: default {outcomes[0].cells} cells along x",
+        f"seconds of one core{per_row}",
+        "mean relative L1 error of density, velocity and pressure",
+        points,
+        others,
+        lines,
+    )
 
 
 def line(outcome: Outcome) -> str:

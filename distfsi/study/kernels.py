@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.device import nvrtc
-from distfsi.device.cpu import Team
+from distfsi.device.cpu import Cpu
 from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostArray, HostKernel, HostRuntime
 from distfsi.device.kernel import Kernel, Launch
@@ -97,7 +97,7 @@ class Inventory(Gpu):
     run_few = run
 
 
-class Listening(Team):
+class Listening(Cpu):
     """One thread that runs kernels and keeps what they are called with."""
 
     def __init__(self):
@@ -106,7 +106,7 @@ class Listening(Team):
 
     def build(self, drivers, constants, bindings=None, real="float64") -> SimpleNamespace:
         drivers = list(drivers)
-        compiled = Team.build(drivers, constants, bindings, real)
+        compiled = Cpu.build(drivers, constants, bindings, real)
 
         def listening(kernel: Kernel):
             run = getattr(compiled, kernel.name)

@@ -188,7 +188,14 @@ SOD = Problem("sod", "Sod's tube", "sod.toml", 400, 50, 128, tube)
 WATER_AIR = Problem("water_air", "Water at 1 GPa against air at 50 kg/m3", "water_air.toml", 1000, 50, 32, tube)
 INTERFACE = Problem("interface", "Slab of water in air, once around", "interface.toml", 200, 32, 64, slab)
 EXPLOSION = Problem(
-    "explosion", "Cylindrical underwater explosion", "undex_2d.toml", 200, 40, None, explosion, True,
+    "explosion",
+    "Cylindrical underwater explosion",
+    "undex_2d.toml",
+    200,
+    40,
+    None,
+    explosion,
+    True,
     ("time.end=1e-4", "domain.lower=[0,0]", 'domain.x=["symmetry","outflow"]', 'domain.y=["symmetry","outflow"]'),
-)  # fmt: skip
+)
 PROBLEMS = (SOD, WATER_AIR, INTERFACE, EXPLOSION)

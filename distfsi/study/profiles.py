@@ -32,9 +32,7 @@ class Profile:
         """The present state of a run in one dimension, on one rank."""
         found = fields(simulation)
         density, velocity, pressure = (found[name][0, 0] for name in ("density", "velocity", "pressure"))
-        return cls(
-            solution, interface, simulation.time, centers(simulation)[0], density, velocity[:, 0], pressure
-        )  # fmt: skip
+        return cls(solution, interface, simulation.time, centers(simulation)[0], density, velocity[:, 0], pressure)
 
     @property
     def spacing(self) -> float:

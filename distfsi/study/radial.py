@@ -37,9 +37,15 @@ class Rings:
 
 
 def cylindrical_explosion(
-    gas: PureState, water: PureState, eos_gas: StiffenedGas, eos_water: StiffenedGas,
-    radius: float, outer: float, time: float, spacing: float,
-) -> Rings:  # fmt: skip
+    gas: PureState,
+    water: PureState,
+    eos_gas: StiffenedGas,
+    eos_water: StiffenedGas,
+    radius: float,
+    outer: float,
+    time: float,
+    spacing: float,
+) -> Rings:
     """The rings at `time` [s] after a cylinder of gas of a `radius` lets go in water that reaches to `outer` [m].
 
     spacing: width of the rings at the start [m]. An ideal gas is a stiffened gas with p_inf = 0.

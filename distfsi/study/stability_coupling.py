@@ -43,7 +43,11 @@ from distfsi.study.references import AIR, STEEL, STEEL_DENSITY, WATER
 from distfsi.study.stability import Map, Stability, Verdict, corners
 
 DIRECTORY = Path("out/study_stability_coupling")
-SCHEMES: dict[str, CouplingScheme] = {"cut cells": "cut_cells", "stairs": "stairs", "paper": "paper"}
+SCHEMES: dict[str, CouplingScheme] = {
+    "cut cells": "cut_cells",
+    "staircase": "staircase",
+    "immersed boundary": "immersed_boundary",
+}
 SURVIVED, RANG, LEAKED, FAILED = range(4)
 VERDICTS = {"survived": "tab:green", "rang": "tab:olive", "leaked": "tab:orange", "failed": "tab:red"}
 CFL = (0.1, 0.5, 0.9)
@@ -71,10 +75,15 @@ def scene_of(
     ]
     fluid = Fluid((Phase("fluid", eos),), tuple(states), "minmod", 1e-6, ((None, None),) * D, "float64")
     return Scene(
-        "stability", Domain(lower, upper, cells, (("wall", "wall"),) * D), Time(end, cfl, None), fluid,
-        Solid((body,), 1.3, 0.5, 1.0), Output("", 0.0, 1), Performance((CELLS,) * D, (CELLS,) * D),
+        "stability",
+        Domain(lower, upper, cells, (("wall", "wall"),) * D),
+        Time(end, cfl, None),
+        fluid,
+        Solid((body,), 1.3, 0.5, 1.0),
+        Output("", 0.0, 1),
+        Performance((CELLS,) * D, (CELLS,) * D),
         coupling=Coupling(scheme),
-    )  # fmt: skip
+    )
 
 
 def judge(scene: Scene, leaked: Callable[[Simulation], float], moves: bool = True) -> Verdict:
@@ -129,9 +138,15 @@ def shell(scheme: CouplingScheme, ratio: float, thickness: float) -> Verdict:
     h, radius = 1.0 / ACROSS, 0.3
     spacing = min(0.5, thickness) * h
     ring = Body(
-        "shell", Tube((0.5, 0.5), radius, radius + thickness * h), spacing, 1e6 * ratio, (0.0, 0.0),
-        LinearEos(1e6 * ratio), NoStrength(), None,
-    )  # fmt: skip
+        "shell",
+        Tube((0.5, 0.5), radius, radius + thickness * h),
+        spacing,
+        1e6 * ratio,
+        (0.0, 0.0),
+        LinearEos(1e6 * ratio),
+        NoStrength(),
+        None,
+    )
     inside = Ball((0.5, 0.5), radius + 0.5 * thickness * h)
     regions = [(PureState(1.0, 1.0), None), (PureState(sqrt(ratio), ratio), inside)]
     scene = scene_of(
@@ -166,22 +181,42 @@ def carried(scheme: CouplingScheme, ratio: float, cfl: float) -> Verdict:
 
 MAPS = (
     Map(
-        "density", "Plate in gas, pressed by 10 : 1", "density of the body over that of the gas",
-        (1.0, 10.0, 100.0, 1e3, 1e4), "CFL number", CFL, pushed,
+        "density",
+        "Plate in gas, pressed by 10 : 1",
+        "density of the body over that of the gas",
+        (1.0, 10.0, 100.0, 1e3, 1e4),
+        "CFL number",
+        CFL,
+        pushed,
     ),
     Map(
-        "thickness", "Ring around compressed gas: walls at all angles", "pressure ratio", (10.0, 1e3, 1e5),
-        "thickness of the wall in cells", (0.5, 1.0, 2.0, 4.0), shell,
+        "thickness",
+        "Ring around compressed gas: walls at all angles",
+        "pressure ratio",
+        (10.0, 1e3, 1e5),
+        "thickness of the wall in cells",
+        (0.5, 1.0, 2.0, 4.0),
+        shell,
     ),
     Map(
-        "impact", "Shock in water hits a steel plate", "pressure [Pa]",
-        (1e6, 1e7, 1e8, 1e9, 1e10), "CFL number", CFL, hit,
+        "impact",
+        "Shock in water hits a steel plate",
+        "pressure [Pa]",
+        (1e6, 1e7, 1e8, 1e9, 1e10),
+        "CFL number",
+        CFL,
+        hit,
     ),
     Map(
-        "lightness", "A wave in water takes a plate along", "density of the body over that of the water",
-        (0.1, 0.3, 1.0, 3.0), "CFL number", CFL, carried,
+        "lightness",
+        "A wave in water takes a plate along",
+        "density of the body over that of the water",
+        (0.1, 0.3, 1.0, 3.0),
+        "CFL number",
+        CFL,
+        carried,
     ),
-)  # fmt: skip
+)
 STUDY = Stability("stability coupling", DIRECTORY, VERDICTS)
 
 

@@ -108,22 +108,43 @@ MACH_NUMBERS = (1.2, 1.5, 2.0, 3.0, 6.0, 10.0, 20.0, 50.0)
 STRENGTHS = (0.2, 0.535, 0.8, 0.9, 0.95, 1.0, 1.2)
 MAPS = (
     Map(
-        "pressure_gas", "Air against air, one phase",
-        "pressure ratio", PRESSURE_RATIOS, "CFL number", CFL, gas_against_gas,
+        "pressure_gas",
+        "Air against air, one phase",
+        "pressure ratio",
+        PRESSURE_RATIOS,
+        "CFL number",
+        CFL,
+        gas_against_gas,
     ),
     Map(
-        "pressure_water", "Water at 1 GPa against air of 1.2 kg/m3",
-        "pressure ratio", PRESSURE_RATIOS, "CFL number", CFL, water_against_air,
+        "pressure_water",
+        "Water at 1 GPa against air of 1.2 kg/m3",
+        "pressure ratio",
+        PRESSURE_RATIOS,
+        "CFL number",
+        CFL,
+        water_against_air,
     ),
     Map(
-        "density_mach", "Shock in air meets helium, CFL number 0.9",
-        "density ratio", DENSITY_RATIOS, "Mach number", MACH_NUMBERS, shock_at_contact, 0.9,
+        "density_mach",
+        "Shock in air meets helium, CFL number 0.9",
+        "density ratio",
+        DENSITY_RATIOS,
+        "Mach number",
+        MACH_NUMBERS,
+        shock_at_contact,
+        0.9,
     ),
     Map(
-        "torn_apart", "Air torn apart (123 problem)",
-        "velocity over that which opens a vacuum", STRENGTHS, "CFL number", CFL, gas_torn_apart,
+        "torn_apart",
+        "Air torn apart (123 problem)",
+        "velocity over that which opens a vacuum",
+        STRENGTHS,
+        "CFL number",
+        CFL,
+        gas_torn_apart,
     ),
-)  # fmt: skip
+)
 
 
 def fastest_wave(tube: Tube) -> float:

@@ -51,9 +51,14 @@ def scene_of(form: Form, bodies: Sequence[Body], size: float) -> Scene:
     """Bodies in a box that reaches `size` [m] to all sides."""
     lower, upper = (-size, -size), (size, size)
     return Scene(
-        "stability", Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2), Time(1.0, 0.5, None),
-        None, Solid(tuple(bodies), 1.3, 0.5, 1.0, **form), Output("", 0.0, 1), Performance((8, 8), (8, 8)),
-    )  # fmt: skip
+        "stability",
+        Domain(lower, upper, (8, 8), (("outflow", "outflow"),) * 2),
+        Time(1.0, 0.5, None),
+        None,
+        Solid(tuple(bodies), 1.3, 0.5, 1.0, **form),
+        Output("", 0.0, 1),
+        Performance((8, 8), (8, 8)),
+    )
 
 
 def plate(name: str, lower: tuple[float, float], upper: tuple[float, float], spacing: float, speed: float) -> Body:
@@ -142,18 +147,33 @@ def thin(form: Form, speed: float, through: float) -> tuple[int, str]:
 SPEEDS = (100.0, 300.0, 1000.0, 2000.0, 3000.0)
 MAPS = (
     Map(
-        "tension", "Copper plate stretched without failure", "strain", (0.1, 0.3, 0.6, 1.0, 2.0),
-        "particles across", (1.0, 2.0, 4.0, 8.0), stretched,
+        "tension",
+        "Copper plate stretched without failure",
+        "strain",
+        (0.1, 0.3, 0.6, 1.0, 2.0),
+        "particles across",
+        (1.0, 2.0, 4.0, 8.0),
+        stretched,
     ),
     Map(
-        "step", "Copper plates meet", "speed [m/s]", SPEEDS,
-        "time step over 0.3 h/c", tuple(f / 0.3 for f in FACTORS), impact,
+        "step",
+        "Copper plates meet",
+        "speed [m/s]",
+        SPEEDS,
+        "time step over 0.3 h/c",
+        tuple(f / 0.3 for f in FACTORS),
+        impact,
     ),
     Map(
-        "thickness", "Copper plates meet", "speed [m/s]", SPEEDS,
-        "particles across", (1.0, 2.0, 4.0, 8.0), thin,
+        "thickness",
+        "Copper plates meet",
+        "speed [m/s]",
+        SPEEDS,
+        "particles across",
+        (1.0, 2.0, 4.0, 8.0),
+        thin,
     ),
-)  # fmt: skip
+)
 
 
 STUDY = Stability("stability solid", DIRECTORY, VERDICTS)

@@ -21,9 +21,10 @@ from distfsi.coupling.cut_cells.wall_particles import WallParticles
 from distfsi.coupling.kernels.cells import COVERED, FLUID
 from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.stages import Stage
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels import rows as row_kernels
@@ -74,31 +75,16 @@ class CutCells:
         self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Structure, blocks: Blocks, device: Device
     ) -> None:
         """Collective. Cuts the cells and fills them with the fluid on their open side."""
-        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device
+        self.model, self.fluid, self.solid, self.blocks, self.device = model, fluid, solid, blocks, device
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
-        self._staircase = scene.coupling.scheme == "stairs"
+        self._staircase = scene.coupling.scheme == "staircase"
         self._particles = SolidParticles(solid)
         self._cell_volume = float(np.prod(grid.spacing))
         self._initial = InitialState(present(scene.fluid), model, grid)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
         self._wall_sums, self._end_sums = np.zeros((2, blocks.local_count, model.conserved))
-        self._build(scene)
-        self.sub_steps = scene.coupling.sub_steps
-        self._narrowest = float(min(grid.spacing[: grid.dimensions]))
-        self.stray = FARTHEST_MOVE * self._narrowest
-        fluid.set_volumes(self.fluid_volume)
-        # a wall that rests: the fractions before and after a step are the same
-        position = self._particles.position
-        passage = self._wall_particles.find(position)
-        self._lone.find(passage.middle, passage.bins)
-        for _ in ("before", "after"):
-            self._wall_particles.cut(passage, position, device.zeros(position.shape))
-        self._fill_at_start()
-
-    def _build(self, scene: Scene) -> None:
-        """The kernels, and who uses them."""
-        blocks, device, model, grid = self.blocks, self.team, self.model, self.blocks.grid
+        # the kernels, and who uses them
         coarsest = max(body.spacing for body in present(scene.solid).bodies)
         self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
         constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
@@ -117,6 +103,18 @@ class CutCells:
         self._fluxes = BandFluxes(model, self.wall.grid, device, self._rows, of_fluid)
         self._forces = WallForces(self._particles, self.wall, self._merging, self._rows, of_particles, of_fluid)
         self._sides = Sides(self.fluid, model.conserved, self.wall.grid, device, of_fluid)
+        # what a step asks for, and what it finds
+        self.sub_steps = scene.coupling.sub_steps
+        self._narrowest = float(min(grid.spacing[: grid.dimensions]))
+        self.stray = FARTHEST_MOVE * self._narrowest
+        fluid.set_volumes(self.fluid_volume)
+        # a wall that rests: the fractions before and after a step are the same
+        position = self._particles.position
+        passage = self._wall_particles.find(position)
+        self._lone.find(passage.middle, passage.bins)
+        for _ in ("before", "after"):
+            self._wall_particles.cut(passage, position, device.zeros(position.shape))
+        self._fill_at_start()
 
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Conserved state (variables,) of the first region without its velocity."""
@@ -165,7 +163,7 @@ class CutCells:
         band, faces = self._fluxes.find_faces(lists.band, above, walls)
         loads, walled = self._forces.begin(band, motion)
         ends = self._merging.rows_in_band(self._sides.cells)
-        start_volume = self.team.empty(lists.band.shape[0])
+        start_volume = self.device.empty(lists.band.shape[0])
         self.geometry = CutGeometry(
             motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands, at_end
         )

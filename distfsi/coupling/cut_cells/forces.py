@@ -60,7 +60,7 @@ class WallForces:
 
     def begin(self, band: Band, motion: WallMotion) -> tuple[WallLoads, Any]:
         """The loads on the wall in a step, none at first, and with which velocity the wall moves in the cells of the
-        band; which of these it passes through, as places in the band."""
+        band; which of these it passes through, by their indices in the band."""
         device, n, D = self._device, band.cells.shape[0], self._D
         sums = (device.zeros((n, D)), device.zeros(n), device.zeros((n, D)), device.zeros(n), device.zeros(n))
         loads, mark = WallLoads(*sums), device.empty(n, np.int8)

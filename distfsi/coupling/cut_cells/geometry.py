@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import product
 from math import prod, sqrt
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,44 @@ def neighbour_offsets(dimensions: int) -> np.ndarray:
     return np.array(sorted(around, key=lambda o: (sum(map(abs, o)), o)))
 
 
+class Lengths(NamedTuple):
+    """How far particles reach among cells [m].
+
+    radius, seen, reach, ranges  as those of WallGeometry
+    search       how far particles change the distances of nodes
+    search_cell  width of the cells of the search grid
+    inflation    of thin bodies
+    """
+
+    radius: float
+    seen: float
+    reach: float
+    ranges: ImageRange
+    search: float
+    search_cell: float
+    inflation: Inflation
+
+
+def lengths_of(cell: Sequence[float], spacing: float, layers: int, staircase: bool) -> Lengths:
+    """The lengths of particles of a `spacing` [m] among cells of the sizes `cell` [m] with so many ghost layers."""
+    h, D = max(cell), len(cell)
+    radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
+    sphere = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h
+    shares = (plate_share(D, (sqrt(D) + more) * h / radius) for more in (THIN, THICK))
+    search = max(radius, sphere + 1.05 * h)
+    off = 0.75 * h if staircase else 0.25 * h  # how far particles may be from where cells are closed
+    touching, apart, aside = (part * max(0.5 * h, spacing) for part in (TOUCHING, APART, ASIDE))
+    return Lengths(
+        radius=radius,
+        seen=min(1.1 * (0.5 * sqrt(D) * h + max(spacing, sphere) + off), (layers + 0.25) * h),
+        reach=(layers + 0.5) * h + search,  # half a cell that the wall may go in a step
+        ranges=ImageRange(touching, apart, aside, search + 0.5 * h),
+        search=search,
+        search_cell=0.5 * min(cell),
+        inflation=Inflation(radius, sphere, *shares),
+    )
+
+
 class WallGeometry:
     """Volume fractions and apertures, before and after a step; arrays are the device's.
 
@@ -95,29 +133,10 @@ class WallGeometry:
         self.kernels: SimpleNamespace = device.build((*DRIVERS, *(STAIRCASE if staircase else ())), constants)
         self._rows = Rows(device, self.kernels)
         self._cells = search.CellSort(self.kernels, device, blocks.grid.lower[:D], blocks.grid.upper[:D])
-        self._layers = blocks.grid.ghost_layers
-        self._choose_lengths(blocks.grid.spacing[:D], spacing)
+        self._lengths = lengths = lengths_of(blocks.grid.spacing[:D], spacing, blocks.grid.ghost_layers, staircase)
+        self.radius, self.seen, self.reach, self.ranges = lengths.radius, lengths.seen, lengths.reach, lengths.ranges
         self._profile = device.array(plane_profile(D))
-        self._allocate(real)
-
-    def _choose_lengths(self, cell: Sequence[float], spacing: float) -> None:
-        """How far particles of a `spacing` [m] reach among cells of the sizes `cell` [m]."""
-        h, D = max(cell), len(cell)
-        self.radius = max(SMOOTHING_RADIUS * h, COARSEST * spacing)
-        sphere = sqrt(D * (0.5 * h) ** 2 + (D - 1) * (0.5 * spacing) ** 2) + MARGIN * h
-        shares = (plate_share(D, (sqrt(D) + more) * h / self.radius) for more in (THIN, THICK))
-        self._inflation = Inflation(self.radius, sphere, *shares)
-        self._search = max(self.radius, sphere + 1.05 * h)
-        off = 0.75 * h if self._staircase else 0.25 * h  # how far particles may be from where cells are closed
-        self.seen = min(1.1 * (0.5 * sqrt(D) * h + max(spacing, sphere) + off), (self._layers + 0.25) * h)
-        self.reach = (self._layers + 0.5) * h + self._search  # half a cell that the wall may go in a step
-        touching, apart, aside = (part * max(0.5 * h, spacing) for part in (TOUCHING, APART, ASIDE))
-        self.ranges = ImageRange(touching, apart, aside, self._search + 0.5 * h)
-        self._search_cell = 0.5 * min(cell)
-
-    def _allocate(self, real: type) -> None:
-        """The fields, of cells that are all open."""
-        blocks, device, D = self.blocks, self.device, self.blocks.grid.dimensions
+        # the fields, of cells that are all open
         count = blocks.local_count
         old, new = (DualArray(device, np.ones((count, 1, *blocks.shape), real)) for _ in ("old", "new"))
         self.fractions = (old, new)
@@ -133,11 +152,11 @@ class WallGeometry:
 
     def sort(self, position: Any, key: Any) -> Bins:
         """Particles by the cells of the search grid that they are in."""
-        return self._cells.sort(position, key, self._search_cell)[1]
+        return self._cells.sort(position, key, self._lengths.search_cell)[1]
 
     def coarse_order(self, position: Any, key: Any) -> Any:
         """Particles so that those near each other, a few in a cell, follow each other."""
-        return self._cells.sort(position, key, 2.0 * self._search_cell)[1].order
+        return self._cells.sort(position, key, 2.0 * self._lengths.search_cell)[1].order
 
     def near_order(self, values: Any, at: Any, shape: tuple[int, ...]) -> Any:
         """`values` (n,) of what lies `at` (n,) in the memory of a field of a `shape` (Z, Y, X) per block, so that those
@@ -162,7 +181,8 @@ class WallGeometry:
         """Spheres (own, 2 + D) as which points of thin bodies count (coupling/cut_cells/kernels/inflation.py); `filled`
         of all, `chosen` as for fill()."""
         sphere, boxes = self.device.empty((own, 2 + self.blocks.grid.dimensions)), -(-chosen.shape[0] // self.lanes)
-        self.device.run(self.kernels.inflate, boxes, sphere, filled.reshape(-1), chosen, self._inflation, points)
+        given = sphere, filled.reshape(-1), chosen, self._lengths.inflation, points
+        self.device.run(self.kernels.inflate, boxes, *given)
         return sphere
 
     # ---- cutting ----------------------------------------------------------------------------------------------------
@@ -176,7 +196,7 @@ class WallGeometry:
         mark = self.device.empty(count, np.int8)
         run(k.mark_inflated, count, sphere, points.values, mark)
         inflated, rows = self._rows.marked(mark)
-        nodes = self._nodes_near(self._search if inflated else self.radius, points.bins)
+        nodes = self._nodes_near(self._lengths.search if inflated else self.radius, points.bins)
         boxes = -(-nodes.shape[0] // self.lanes)
         run(k.find_distances, boxes, nodes, distance, self.radius, self._profile, points, self.grid)
         if inflated:
@@ -194,10 +214,11 @@ class WallGeometry:
 
     def add_spheres(self, nodes: Any, position: Any, sphere: Any, key: Any) -> None:
         """Distances at the `nodes` become those to these particles' spheres where they are nearer."""
-        bins, boxes = self._cells.sort(position, key, 2.0 * self._search_cell)[1], -(-nodes.shape[0] // self.lanes)
-        distance, largest = self._distance.device.reshape(-1), self._inflation.largest
-        particles = Cloud(position, sphere, bins)
-        self.device.run(self.kernels.add_spheres, boxes, nodes, distance, largest, self._search, particles, self.grid)
+        lengths, boxes = self._lengths, -(-nodes.shape[0] // self.lanes)
+        bins = self._cells.sort(position, key, 2.0 * lengths.search_cell)[1]
+        distance, largest = self._distance.device.reshape(-1), lengths.inflation.largest
+        given = nodes, distance, largest, lengths.search, Cloud(position, sphere, bins), self.grid
+        self.device.run(self.kernels.add_spheres, boxes, *given)
 
     def _open(self) -> None:
         """Find the new fractions and apertures from the distances."""

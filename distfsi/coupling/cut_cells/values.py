@@ -76,7 +76,7 @@ class CellLists:
 class OpenFaces:
     """Open faces of the band's cells.
 
-    index  (m,) places in `seen`, ascending
+    index  (m,) indices in `seen`, ascending
     seen   (D, n, 2) flat, of all faces: see find_faces() in coupling/cut_cells/kernels/fluxes.py
     flux   (n, 2 D FLUXES) room for what passes them in a stage
     """
@@ -101,7 +101,7 @@ class CutGeometry:
     merging   of the band's cells
     faces     of the band that are open
     sides     (s,) rows of the cells at the domain's ends that are in the band or covered
-    walled    (k,) places in the band of the cells that the wall passes through
+    walled    (k,) indices in the band of the cells that the wall passes through
     loads     how the wall moves, and what the fluid gives to it: the stages add to that
     start_volume  (n,) fluid volume fractions of the band's cells before the first stage, which leaves them here
     at_end    whether bodies touch an end of the domain

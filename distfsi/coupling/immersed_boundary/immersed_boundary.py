@@ -18,9 +18,10 @@ from distfsi.coupling.kernels.interpolation import Cloud
 from distfsi.coupling.kernels.spreading import Receivers
 from distfsi.coupling.particles import SolidParticles
 from distfsi.device.interface import Device, DualArray
-from distfsi.fluid.fluid import Fluid, Stage
+from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.stages import Stage
 from distfsi.mesh import search
 from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
@@ -103,7 +104,7 @@ class ImmersedBoundary:
         self, scene: Scene, model: FluidModel, fluid: Fluid, solid: Structure, blocks: Blocks, device: Device
     ) -> None:
         """Collective. Prepares the solid and classifies the cells, so that `covered` is known from the start on."""
-        self.model, self.fluid, self.solid, self.blocks, self.team = model, fluid, solid, blocks, device
+        self.model, self.fluid, self.solid, self.blocks, self.device = model, fluid, solid, blocks, device
         grid, self._dimensions = blocks.grid, blocks.grid.dimensions
         self._particles = SolidParticles(solid)
         self._grid, self._table = blocks.grid_on(device), blocks.table_on(device)
@@ -146,7 +147,7 @@ class ImmersedBoundary:
     def _find_surroundings(self, rest: np.ndarray) -> Surroundings:
         """The cells around a cell, ring by ring, and their weights in Eq. 32: 1/distance^2; `rest` where there are
         none."""
-        D, layers, upload = self._dimensions, self.blocks.grid.ghost_layers, self.team.array
+        D, layers, upload = self._dimensions, self.blocks.grid.ghost_layers, self.device.array
         around = np.array([o for o in product(range(-layers, layers + 1), repeat=D) if any(o)])
         ring = np.abs(around).max(axis=1)
         around = around[np.argsort(ring, kind="stable")]
@@ -171,7 +172,7 @@ class ImmersedBoundary:
                     found.append(active.take(-side, axis=2 - axis).ravel())
                     sides.append(np.full(len(found[-1]), 2 * axis + side))
         cell = np.concatenate(found)
-        return self.team.array(cell), self.team.array(np.concatenate(sides)), cell // prod(blocks.shape)
+        return self.device.array(cell), self.device.array(np.concatenate(sides)), cell // prod(blocks.shape)
 
     # ---- one step ---------------------------------------------------------------------------------------------------
 
@@ -181,7 +182,7 @@ class ImmersedBoundary:
 
     def update_geometry(self) -> CoveredCells:
         """Collective. Find the covered cells, and the velocity of the wall in those that fluxes see."""
-        around, device, blocks, D = self.solid.around, self.team, self.blocks, self._dimensions
+        around, device, blocks, D = self.solid.around, self.device, self.blocks, self._dimensions
         # the particles
         position, count = around.position, around.position.shape[0]
         volume, momentum = device.empty((count, 1)), device.empty((count, 1 + D))
@@ -213,7 +214,7 @@ class ImmersedBoundary:
         self._run(k.fill_deep, cells.deep, U, around.rest, grid)
         if stage.number == 0:
             self._run(k.fill_fresh, cells.fresh, U, kind, around, grid)
-            content = self.team.empty((cells.fresh.shape[0], self.model.conserved))
+            content = self.device.empty((cells.fresh.shape[0], self.model.conserved))
             self._run(k.find_contents, cells.fresh, U, content, grid)
             self._created["fresh"] += self._per_block(cells.counts[:, FRESH_CELLS], content) * self._cell_volume
         return U
@@ -231,7 +232,7 @@ class ImmersedBoundary:
 
     def transfer_impulse(self, cells: CoveredCells, U: Any, dt: float) -> Transfer:
         """Collective. What the fluid gives to this rank's particles in the step."""
-        D, p, device, k = self._dimensions, self._particles, self.team, self.kernels
+        D, p, device, k = self._dimensions, self._particles, self.device, self.kernels
         # what a covered cell gives per kernel value
         wall = (cells.passed, cells.velocity, cells.inertia)
         self._run(self.fluid_kernels.find_transfer, cells.covered, *wall, self._transfer, self._grid)
@@ -260,7 +261,7 @@ class ImmersedBoundary:
     def _list_cells(self) -> tuple[np.ndarray, Any, Any, Any]:
         """How many cells of each kind there are (local blocks, 3); covered cells that fluxes see, those that they do
         not, and fresh ones, block by block."""
-        device, count, k = self.team, self.blocks.local_count, self.kernels
+        device, count, k = self.device, self.blocks.local_count, self.kernels
         found = device.empty((count, 3), np.int64)
         device.run(k.find_depth, count, self._kinds, self._occupied.read, self._around.offsets, found, self._grid)
         counts = device.download(found)
@@ -274,7 +275,7 @@ class ImmersedBoundary:
         return self.kind.device.reshape(-1)
 
     def _run(self, kernel: Any, cells: Any, *arguments: Any) -> None:
-        self.team.run(kernel, cells.shape[0], cells, *arguments)
+        self.device.run(kernel, cells.shape[0], cells, *arguments)
 
     def _exchange(self, field: np.ndarray, mirror: np.ndarray, inflow: float) -> None:
         self.exchange.start(field, mirror, np.full((3, 2, field.shape[1]), inflow))
@@ -282,7 +283,7 @@ class ImmersedBoundary:
 
     def _per_block(self, counts: np.ndarray, values: Any) -> np.ndarray:
         """Sums (local blocks, k) of `values` (n, k) on the device, of which each block has so many."""
-        return Groups(self.team, self.kernels, counts).sums(values)
+        return Groups(self.device, self.kernels, counts).sums(values)
 
     # ---- looking at it ----------------------------------------------------------------------------------------------
 

@@ -5,17 +5,17 @@ from distfsi.fluid.kernels.records import Faces
 from distfsi.fluid.kernels.rows import face_fluxes, increments_row, primitives_row
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS, HYDROSTATIC, TRANSVERSE_SENSOR, VARIABLES
-from distfsi.mesh.kernels.grid import BlockGrid, block_size, first_value
+from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, first_value
 
 # Cells that give the flux through one face: its line of four is the middle one of five.
 BOX, LINE = 20, 8
 
 
 @helper
-def fall_along(axis, dt, grid: BlockGrid):
-    """g h of the body force along an axis [m2/s2], to the bit as the stage finds it; 0 without one."""
+def fall_along(axis, dt, rate):
+    """g h of the body force along an axis [m2/s2], to the bit as the stage finds it; 0 without one. rate: dt/h."""
     force = sum((BODY_FORCE[d] if axis == d else 0.0) for d in static_range(DIMENSIONS))
-    return force * (real(dt) / real(dt / grid.spacing[axis])) if HYDROSTATIC else 0.0
+    return force * (real(dt) / real(rate)) if HYDROSTATIC else 0.0
 
 
 @helper
@@ -37,13 +37,13 @@ def look_at_face(U, at, axis, dt, grid: BlockGrid, P, T):
             for c in range(1, 3):
                 primitives_row(U, P, first + (c - 1) * step - aside, cells, LINE + c - 4 * d, BOX, 1)
                 primitives_row(U, P, first + (c - 1) * step + aside, cells, LINE + c + 4 * d, BOX, 1)
-    increments_row(P, T, LINE + 1, BOX, 1, 0, 2, 2, fall_along(axis, dt, grid))
+    h = grid.spacing[block_of(at, grid), axis]
+    increments_row(P, T, LINE + 1, BOX, 1, 0, 2, 2, fall_along(axis, dt, dt / h))
 
 
 @helper
-def flux_of_face(P, T, F, dt, axis, grid: BlockGrid):
-    """F = flux through the face that was looked at, by the rows of the stage, which takes `dt` [s]."""
-    rate = real(dt / grid.spacing[axis])
+def flux_of_face(P, T, F, rate, axis):
+    """F = flux through the face that was looked at, by the rows of the stage; rate: dt/h [s/m]."""
     face = Faces(
         cell=LINE + 1,
         variables=BOX,
@@ -55,6 +55,6 @@ def flux_of_face(P, T, F, dt, axis, grid: BlockGrid):
         flux=0,
         rows=2,
         axis=axis,
-        rate=real(2 * DIMENSIONS) * rate,
+        rate=real(2 * DIMENSIONS) * real(rate),
     )
     face_fluxes(P, T, F, face, 1, 1)

@@ -50,8 +50,8 @@ def cells_between(minimum, maximum, axis, block, seen, grid: BlockGrid):
     """First and past-the-end cell along an axis, in the memory of a block, whose centers are from `minimum` to
     `maximum`; seen (3, 2): first and past-the-end cell of the grid that may be looked at."""
     layers = ghosts()[0]
-    low = int(floor((minimum - grid.lower[axis]) / grid.spacing[axis] + 0.5))
-    high = int(floor((maximum - grid.lower[axis]) / grid.spacing[axis] - 0.5))
+    low = int(floor((minimum - grid.lower[axis]) / grid.spacing[block, axis] + 0.5))
+    high = int(floor((maximum - grid.lower[axis]) / grid.spacing[block, axis] - 0.5))
     first = max(grid.origin[block, axis] - layers, seen[axis, 0])
     end = min(grid.origin[block, axis] + grid.extent[block, axis] + layers, seen[axis, 1])
     return (max(low, first), min(high + 1, end))
@@ -89,7 +89,7 @@ def spread_row(total, points, part, center, outside, field, first, cells, radius
 def particles_of_block(points, part, chosen, first, last, particles: Receivers, radius):
     """How many of the particles `chosen`, from the `first` on, before the `last`, are computed side by side: of one
     block, near each other. They are put to `points` and how much their images count to `part` (D, LANES), whose
-    remaining places repeat one of them."""
+    remaining lanes repeat one of them."""
     x, n = point_of(particles.position, chosen[first]), 1
     while (
         first + n < last
@@ -105,9 +105,10 @@ def particles_of_block(points, part, chosen, first, last, particles: Receivers, 
 
 
 @helper
-def put_center(center, outside, index, grid: BlockGrid):
-    """center (D,) [m] of the cell of an index in the grid; outside (D,) = 1 along axes along which it is outside."""
-    x = center_of(index, grid)
+def put_center(center, outside, index, block, grid: BlockGrid):
+    """center (D,) [m] of the cell of an index in the grid, in the memory of a block; outside (D,) = 1 along axes along
+    which it is outside."""
+    x = center_of(index, block, grid)
     for d in static_range(DIMENSIONS):
         center[d] = x[d]
         outside[d] = 1.0 if index[d] < 0 or index[d] >= grid.cells[d] else 0.0
@@ -150,7 +151,7 @@ def spread(begin, end, chosen, particles: Receivers, radius, kind, giver, field,
                         at = cell_at(b, i - grid.origin[b, 0], j - grid.origin[b, 1], k - grid.origin[b, 2], grid)
                         given = first_value(at, TRANSFERRED, cells)
                         if kind[at] == giver and largest_value(field, given, cells) > 0.0:
-                            put_center(center, outside, (i, j, k), grid)
+                            put_center(center, outside, (i, j, k), b, grid)
                             spread_row(
                                 total,
                                 points,

@@ -1,6 +1,6 @@
 """The five-equation model of two compressible materials with one velocity and one pressure all the time.
 
-Stored and primitive states, pressure and flux are those of the six-equation model (two_phase.py); there are no phase
+Stored and primitive states, pressure and flux are those of the six-equation model (six_equation.py); there are no phase
 energies and there is no relaxation. The volume fraction is carried along, Da1/Dt = 0 (Allaire, Clerc, Kokh, J. Comput.
 Phys. 181, 2002). The term K div u of Kapila et al. (Phys. Fluids 13, 2001) would let compression change it, as the
 relaxation of the six-equation model does; taken explicitly it doubles the errors of a tube of water and air and ends in
@@ -72,7 +72,7 @@ def behind_wave(W, s, u_face):
 
 
 def updated(U_n, U, W, D, b, dt):
-    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), written as a change of U_n (two_phase.py)."""
+    """One stage of SSP-RK3: U_n + b (U - D + dt S - U_n), written as a change of U_n (six_equation.py)."""
     a1, a1_n = W[3 + DIMENSIONS], U_n[3 + DIMENSIONS]
     change = b * (a1 - D[3 + DIMENSIONS] + a1 * D[FLUXES - 1] - a1_n)
     a1_new = min(max(a1_n + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)

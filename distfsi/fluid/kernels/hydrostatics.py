@@ -1,9 +1,9 @@
 """Ghost cells at the ends of the domain under a body force: their pressure is that of fluid at rest."""
 
-from distfsi.device.markers import driver, helper, load, store
+from distfsi.device.markers import driver, helper, load, real, store
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS, GHOSTS, PHASES, VARIABLES, conserved, primitives
-from distfsi.mesh.kernels.grid import first_value
+from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, first_value
 
 AT, OUT, AXIS, MIRRORED = range(4)  # columns of the table of columns of ghost cells
 
@@ -22,18 +22,18 @@ def density_of(W):
 
 
 @driver
-def weigh_ghosts(begin, end, columns, U, spacing):
+def weigh_ghosts(begin, end, columns, U, grid: BlockGrid):
     """After the ghosts of U are filled: those beyond the ends of the domain get the pressure of the cell that they
     repeat or mirror, and the weight of the fluid between.
 
     columns (n, 4): AT the last active cell, OUT the step in memory from there outwards, AXIS, and whether the ghosts
-    are MIRRORED; spacing (3,) [m].
+    are MIRRORED.
     """
-    cells = U.shape[2] * U.shape[3] * U.shape[4]
+    cells = block_size(grid)
     for n in range(begin, end):
         at, out, axis = columns[n, AT], columns[n, OUT], columns[n, AXIS]
         force = sum((BODY_FORCE[d] if axis == d else 0.0) for d in static_range(DIMENSIONS))
-        fall = (1.0 if out > 0 else -1.0) * (force * spacing[axis])
+        fall = (1.0 if out > 0 else -1.0) * (force * real(grid.spacing[block_of(at, grid), axis]))
         weight, before = 0.0, 0.0
         for layer in range(GHOSTS):
             ghost = at + (layer + 1) * out

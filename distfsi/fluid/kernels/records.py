@@ -38,6 +38,7 @@ class Tiles(NamedTuple):
     stages   (tiles + 1,) for how many stages in a row each has not changed; counted here
     through  (tiles, 6, conserved) what has left through the domain's sides, per area of a face
     limited  (tiles,) faces at the low sides of its cells whose flux was limited
+    spacing  (blocks, 3) size of the cells of each block [m]
     """
 
     table: Any
@@ -45,6 +46,7 @@ class Tiles(NamedTuple):
     stages: Any
     through: Any
     limited: Any
+    spacing: Any
 
 
 class Box(NamedTuple):
@@ -55,10 +57,17 @@ class Box(NamedTuple):
     z: int
 
 
-class StageStep(NamedTuple):
-    """One stage of a time step: after = before + b (now + change - before).
+class StageTimes(NamedTuple):
+    """One stage of a time step of `dt` [s]: after = before + b (now + change - before); `weight`: its share in it."""
 
-    weight   the stage's share in the step
+    b: float
+    dt: float
+    weight: float
+
+
+class StageStep(NamedTuple):
+    """The stage of cells of one size.
+
     x, y, z  dt/h along the axes [s/m]
     """
 

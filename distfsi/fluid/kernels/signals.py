@@ -2,9 +2,10 @@
 
 from math import sqrt
 
-from distfsi.device.markers import ByHand, driver, load, row, store, workspace
+from distfsi.device.markers import ByHand, driver, load, real, row, store, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, PHASES, VARIABLES, primitives, sound_speed
+from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, first_value
 
 
 @row
@@ -34,24 +35,19 @@ def signal_block(constants, arguments):
 
 @ByHand("stage.cu", ("primitives", "sound_speed"), signal_block)
 @driver
-def fastest_signals(begin, end, chosen, U, start, extent, rx, ry, rz, fastest):
+def fastest_signals(begin, end, chosen, U, fastest, grid: BlockGrid):
     """fastest[block] = max over its cells of sum_d (|u_d| + c)/h_d [1/s] for the blocks chosen[begin:end]; NaN when a
-    cell has no valid state.
-
-    start: index of a block's first active cell within one variable; rx, ry, rz: 1/h.
-    """
-    sy = U.shape[4]
-    sz = sy * U.shape[3]
-    su = sz * U.shape[2]
-    S = workspace(2 * sy)
+    cell has no valid state."""
+    su, S = block_size(grid), workspace(2 * grid.shape[2])
     for at in range(begin, end):
         block = chosen[at]
-        n = extent[block, 0]
+        n = grid.extent[block, 0]
+        rx, ry, rz = tuple(real(1.0 / grid.spacing[block, d]) for d in static_range(3))
         for i in range(2 * n):
             S[i] = 0.0
-        for k in range(extent[block, 2]):
-            for j in range(extent[block, 1]):
-                signal_row(U, S, block * VARIABLES * su + start + k * sz + j * sy, su, n, rx, ry, rz)
+        for k in range(grid.extent[block, 2]):
+            for j in range(grid.extent[block, 1]):
+                signal_row(U, S, first_value(cell_at(block, 0, j, k, grid), VARIABLES, su), su, n, rx, ry, rz)
         # the largest of all columns, or NaN
         largest, invalid = S[0], S[n]
         for i in range(1, n):

@@ -219,6 +219,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const long long at = begin + blockIdx.x;
     const long long t = chosen[at], *tile = tiles_table + t * tiles_table_1;
     const int nx = tile[NX], ny = tile[NY], nz = tile[NZ], sides = tile[SIDES];
+    const double *h = tiles_spacing + 3 * tile[BLOCK];
+    const real dt = real(times_dt), step_x = real(times_dt / h[0]), step_y = real(times_dt / h[1]), step_z = real(times_dt / h[2]);
     const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
 
     // whether all cells that the tile reads hold one state
@@ -253,7 +255,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
             __syncthreads();
-            for (int j = 0; j < m; j++) account(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, step_weight * step_z);
+            for (int j = 0; j < m; j++) account(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, times_weight * step_z);
         }
         __syncthreads();
     }
@@ -272,8 +274,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             }
         }
         for (int j = 0; j < m; j++) {
-            if (sides & 1) account(out, F + j * ROW, 0, step, 1, x_alike, step_weight * step_x);
-            if (sides & 2) account(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, step_weight * step_x);
+            if (sides & 1) account(out, F + j * ROW, 0, step, 1, x_alike, times_weight * step_x);
+            if (sides & 2) account(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, times_weight * step_x);
         }
         // fluxes along y
         if constexpr (DIMENSIONS > 1) {
@@ -289,8 +291,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                     D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * step_y;
                 }
             }
-            if (sides & 4) account(out + 2 * CONSERVED, F, 1, step, nx, y_alike, step_weight * step_y);
-            if (sides & 8) account(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, step_weight * step_y);
+            if (sides & 4) account(out + 2 * CONSERVED, F, 1, step, nx, y_alike, times_weight * step_y);
+            if (sides & 8) account(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, times_weight * step_y);
         }
         // fluxes through the high side along z, which are those of the next plane's low side
         if constexpr (DIMENSIONS > 2) {
@@ -307,7 +309,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                 if (inside)
                     for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v * APART];
                 __syncthreads();
-                for (int j = 0; j < m; j++) account(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, step_weight * step_z);
+                for (int j = 0; j < m; j++) account(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, times_weight * step_z);
             }
         }
         // the new state
@@ -324,7 +326,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             }
             const auto W = tuple_of<VARIABLES>(P + cell(tx, ty, k), SP);
             const auto divergence = tuple_of<FLUXES>(D, APART);
-            advance(numbers, tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, step_b, step_dt, states_after + u, su);
+            advance(numbers, tuple_of<VARIABLES>(before), tuple_of<VARIABLES>(now), W, divergence, times_b, dt, states_after + u, su);
         }
         __syncthreads();
     }
@@ -354,11 +356,12 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) fastest_signals_kernel(
 {
     __shared__ real largest[THREADS];
     const auto numbers = NUMBERS;
-    const real rates[3] = {rx, ry, rz};
     const long long sy = U_4, sz = sy * U_3, su = sz * U_2;
     const long long at = begin + blockIdx.x;
-    const long long block = chosen[at], nx = extent[3 * block], ny = extent[3 * block + 1], nz = extent[3 * block + 2];
-    const real *first = U + block * VARIABLES * su + start;
+    const long long block = chosen[at], *extent = grid_extent + 3 * block, nx = extent[0], ny = extent[1], nz = extent[2];
+    const double *h = grid_spacing + 3 * block;
+    const real rates[3] = {real(1 / h[0]), real(1 / h[1]), real(1 / h[2])};
+    const real *first = U + block * VARIABLES * su + (DIMENSIONS > 2 ? GHOSTS * sz : 0) + (DIMENSIONS > 1 ? GHOSTS * sy : 0) + GHOSTS;
     real most = 0, invalid = 0;
     for (long long cell = threadIdx.x; cell < nx * ny * nz; cell += THREADS) {
         const real *u = first + cell / (nx * ny) * sz + cell / nx % ny * sy + cell % nx;

@@ -10,7 +10,17 @@ Where all cells that a tile reads hold the same state, all its cells get the sam
 """
 
 from distfsi.device.markers import ByHand, driver, helper, real, workspace
-from distfsi.fluid.kernels.records import SIDES, Box, CellFluxes, Cells, Faces, StageStep, States, Tiles
+from distfsi.fluid.kernels.records import (
+    SIDES,
+    Box,
+    CellFluxes,
+    Cells,
+    Faces,
+    StageStep,
+    StageTimes,
+    States,
+    Tiles,
+)
 from distfsi.fluid.kernels.rows import bisect_cells, face_fluxes, increments_row, primitives_row, update_row
 from distfsi.fluid.kernels.tile import (
     Tile,
@@ -29,6 +39,7 @@ from distfsi.fluid.kernels.tile import (
     slot_y,
     slot_z,
     slots,
+    step_of_tile,
     tile_at,
 )
 from distfsi.formulas.symbols import (
@@ -252,12 +263,13 @@ def stage_block(constants, arguments):
 
 @ByHand("stage.cu", STAGE_FORMULAS, stage_block)
 @driver
-def advance_tiles(begin, end, chosen, tiles: Tiles, states: States, step: StageStep, box: Box):
+def advance_tiles(begin, end, chosen, tiles: Tiles, states: States, times: StageTimes, box: Box):
     """One Runge-Kutta stage of the tiles chosen[begin:end]; box: cells of a whole tile with ghosts."""
     P = workspace(VARIABLES * box.x * box.y * box.z)
     T, F = workspace(increments_in(slots(box), box)), workspace(fluxes_in(slots(box), box))
     for at in range(begin, end):
         t = chosen[at]
+        step = step_of_tile(t, tiles, times)
         seen = tile_at(t, tiles, states, False)
         tile = tile_at(t, tiles, states, tiles.calm[t] or holds_one_state(states, seen))
         advance_tile(states, tiles, tile, box, step, P, T, F)

@@ -7,7 +7,7 @@ plane, which take turns at its low and high faces along z.
 
 from typing import NamedTuple
 
-from distfsi.device.markers import helper, load
+from distfsi.device.markers import helper, load, real
 from distfsi.fluid.kernels.records import (
     BLOCK,
     NX,
@@ -20,6 +20,7 @@ from distfsi.fluid.kernels.records import (
     Box,
     CellFluxes,
     StageStep,
+    StageTimes,
     States,
     Tiles,
     position_of,
@@ -64,6 +65,15 @@ def tile_at(t, tiles: Tiles, states: States, uniform):
     volume = state - block * (VARIABLES - states.volumes.shape[1]) * variables
     cells = tiles.table[t, NX], tiles.table[t, NY], tiles.table[t, NZ]
     return (t, state, volume, next_y, next_z, variables, cells[0], cells[1], cells[2], uniform)
+
+
+@helper
+def step_of_tile(t, tiles: Tiles, times: StageTimes):
+    """The fields of StageStep for tile number t, from the size of its block's cells: once, so that rows know it as a
+    number."""
+    b, dt = tiles.table[t, BLOCK], times.dt
+    x, y, z = tuple(real(dt / tiles.spacing[b, d]) for d in static_range(3))
+    return (times.b, real(dt), times.weight, x, y, z)
 
 
 # ---- where things are ------------------------------------------------------------------------------------------------

@@ -18,30 +18,32 @@ class BlockGrid(NamedTuple):
     shape    (3,) cells of a block in memory along z, y, x, ghosts included
     steps    (3,) in memory from a cell to the next one along x, y, z
     lower    (3,) corner of the grid [m]
-    spacing  (3,) size of the cells [m]
     cells    (3,) of the whole grid along x, y, z
     origin   (blocks, 3) index in the grid of each block's first active cell
     extent   (blocks, 3) active cells of each block
+    spacing  (blocks, 3) size of its cells [m]
     """
 
     shape: Any
     steps: Any
     lower: Any
-    spacing: Any
     cells: Any
     origin: Any
     extent: Any
+    spacing: Any
 
 
 class BlockTable(NamedTuple):
     """Which block a cell of the grid belongs to.
 
     block_cells  (3,) cells of a whole block along x, y, z
+    spacing      (3,) size of the cells of the blocks in it [m]
     curve_index  (along x, along y, along z) number of each block
     first        number of this rank's first block
     """
 
     block_cells: Any
+    spacing: Any
     curve_index: Any
     first: int
 
@@ -59,6 +61,12 @@ def ghosts():
 def block_size(grid: BlockGrid):
     """Cells of a block in memory."""
     return grid.shape[0] * grid.shape[1] * grid.shape[2]
+
+
+@helper
+def block_of(at, grid: BlockGrid):
+    """The block that a cell is in."""
+    return at // block_size(grid)
 
 
 @helper
@@ -109,7 +117,7 @@ def step_to(offsets, m, grid: BlockGrid):
 def index_of(at, grid: BlockGrid):
     """Index of a cell in the grid; that of a ghost cell may lie outside."""
     gx, gy, gz = ghosts()
-    b = at // block_size(grid)
+    b = block_of(at, grid)
     return (
         grid.origin[b, 0] + at % grid.shape[2] - gx,
         grid.origin[b, 1] + at // grid.shape[2] % grid.shape[1] - gy,
@@ -135,21 +143,36 @@ def is_along(index, axis, way, grid: BlockGrid):
 
 
 @helper
-def center_of(index, grid: BlockGrid):
-    """Center [m] of the cell of an index in the grid."""
-    return tuple(grid.lower[d] + (index[d] + 0.5) * grid.spacing[d] for d in static_range(DIMENSIONS))
+def center_of(index, block, grid: BlockGrid):
+    """Center [m] of the cell of an index in the grid, of the size of those of a block."""
+    return tuple(grid.lower[d] + (index[d] + 0.5) * grid.spacing[block, d] for d in static_range(DIMENSIONS))
 
 
 @helper
-def cell_volume(grid: BlockGrid):
-    """Volume of a cell [m^d]."""
-    return grid.spacing[0] * grid.spacing[1] * grid.spacing[2]
+def center_of_cell(at, grid: BlockGrid):
+    """Center [m] of a cell."""
+    return center_of(index_of(at, grid), block_of(at, grid), grid)
+
+
+@helper
+def middle_of(block, grid: BlockGrid):
+    """Middle [m] of a block's active cells."""
+    return tuple(
+        grid.lower[d] + (grid.origin[block, d] + 0.5 * grid.extent[block, d]) * grid.spacing[block, d]
+        for d in static_range(DIMENSIONS)
+    )
+
+
+@helper
+def cell_volume(block, grid: BlockGrid):
+    """Volume of a block's cells [m^d]."""
+    return grid.spacing[block, 0] * grid.spacing[block, 1] * grid.spacing[block, 2]
 
 
 @helper
 def block_coordinate(x, axis, grid: BlockGrid, table: BlockTable):
     """Coordinate along an axis of the block that x [m] is in or, outside, nearest to, as mesh/blocks.py finds it."""
-    cell = (x - grid.lower[axis]) / grid.spacing[axis]
+    cell = (x - grid.lower[axis]) / table.spacing[axis]
     last = 1.0 * (grid.cells[axis] - 1)
     return int(floor(max(min(cell, last), 0.0))) // table.block_cells[axis]
 

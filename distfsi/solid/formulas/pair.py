@@ -9,7 +9,7 @@ from math import sqrt
 
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import ARTIFICIAL_STRESS, DIMENSIONS, SMOOTHING_RATIO, VISCOSITY_ALPHA, VISCOSITY_BETA
-from distfsi.formulas.tensors import dot, identity_plus, inverse, least_eigenvalue, product, rows, times
+from distfsi.formulas.tensors import dot, identity_plus, inverse, minimum_eigenvalue, product, rows, times
 from distfsi.solid.formulas.smoothing import smoothing_kernel
 
 
@@ -48,7 +48,7 @@ def gradient_correction(moment):
     It turns into the unit matrix, smoothly, where neighbours are missing all around or along one direction.
     """
     # The eigenvalue is 1 deep inside a body, about 1/2 at its surface; its bound is 0.1 or more even at corners.
-    trust = min(max(20.0 * least_eigenvalue(moment) - 1.0, 0.0), 1.0)
+    trust = min(max(20.0 * minimum_eigenvalue(moment) - 1.0, 0.0), 1.0)
     exact = inverse(moment)
     return tuple(
         tuple(

@@ -13,7 +13,7 @@ from distfsi.formulas.tensors import (
     determinant,
     dot,
     identity_plus,
-    least_eigenvalue,
+    minimum_eigenvalue,
     product,
     scaled,
     trace,
@@ -159,7 +159,7 @@ def fit_bonds(begin, end, chosen, bonds: Bonds, reference, bond_state, fit: Fit,
         store_matrix(fit.correction, r, matrix)
         store_matrix(fit.deformation, r, identity_plus(1.0, product(total, matrix)))
         moments[r, 0] = determinant(moment)
-        moments[r, 1] = least_eigenvalue(moment)
+        moments[r, 1] = minimum_eigenvalue(moment)
 
 
 @driver

@@ -97,7 +97,7 @@ def find_band(begin, end, near, plain, mark, whole, kind, volume, offsets, count
 
 @driver
 def list_band(begin, end, near, mark, first, band, covered, uneven, grid: BlockGrid):
-    """Write the cells of the band, the covered and the uneven ones, row by row, from the places first (rows, 3) on."""
+    """Write the cells of the band, the covered and the uneven ones, row by row, from the indices first (rows, 3) on."""
     for r in range(begin, end):
         b, at = block_of_row(r, grid), r * grid.shape[2] + ghosts()[0]
         n, m, l = first[r, BAND_CELLS], first[r, COVERED_CELLS], first[r, UNEVEN_CELLS]

@@ -35,7 +35,7 @@ from distfsi.formulas.symbols import (
     primitives,
 )
 from distfsi.formulas.tensors import dot
-from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_volume, first_value
+from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, cell_volume, first_value
 
 STOPS_LOW, STOPS_HIGH = 1, 2
 
@@ -68,7 +68,7 @@ def find_walls(begin, end, cells, aperture, area, walls: Walls, grid: BlockGrid)
             high = aperture_between(walls, cells[n] + grid.steps[axis], axis, grid)
             aperture[n, 2 * axis] = low
             aperture[n, 2 * axis + 1] = high
-            area[n, axis] = (low - high) / grid.spacing[axis]
+            area[n, axis] = (low - high) / grid.spacing[block_of(cells[n], grid), axis]
 
 
 @driver
@@ -122,8 +122,8 @@ def primitives_of_faces(Q, P):
 
 @helper
 def stop_slopes(P, T, i, stops, fall):
-    """The face in lane i gets no rises of the cells whose slopes it stops, but for the weight of a body force, with g h
-    along the face's axis."""
+    """The face in lane i gets no increments of the cells whose slopes it stops, but for the weight of a body force,
+    with g h along the face's axis."""
     stops_low = stops == STOPS_LOW or stops == STOPS_LOW + STOPS_HIGH
     for v in range(VARIABLES):
         if stops_low:
@@ -149,8 +149,8 @@ def run_of_axis(faces, first, last, per_axis):
 
 @driver
 def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
-    """flux (n, 2 D FLUXES) = what passes the `faces` (m,), places in `seen` as find_faces() left it, in ascending
-    order, of the band's `cells`. An item is a box of LANES faces."""
+    """flux (n, 2 D FLUXES) = what passes the `faces` (m,), indices in `seen` as find_faces() left it, in ascending
+    order, of the band's `cells`, which all have one size. An item is a box of LANES faces."""
     per_axis = 2 * len(cells)
     Q, P = workspace(BOX * VARIABLES * LANES), workspace(BOX * VARIABLES * LANES)
     T, F = workspace(2 * VARIABLES * LANES), workspace((2 * FLUXES + 2) * LANES)
@@ -165,7 +165,8 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
                 look_at_faces(U, Q, at, i, axis, grid)
             primitives_of_faces(Q, P)
             # their reconstruction, which ends at the wall
-            c, fall = (LINE + 1) * LANES, fall_along(axis, dt, grid)
+            h = grid.spacing[block_of(cells[faces[first] % per_axis // 2], grid), axis]
+            c, fall = (LINE + 1) * LANES, fall_along(axis, dt, dt / h)
             increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES, fall)
             for i in range(n):
                 stop_slopes(P, T, i, seen[faces[first + i]] - 1, fall)
@@ -181,7 +182,7 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
                 flux=0,
                 rows=2 * LANES,
                 axis=axis,
-                rate=real(2 * DIMENSIONS) * real(dt / grid.spacing[axis]),
+                rate=real(2 * DIMENSIONS) * real(dt / h),
             )
             face_fluxes(P, T, F, faces_of_box, LANES, LANES)
             for i in range(n):
@@ -198,13 +199,14 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
 @helper
 def add_fluxes(D, n, band: Band, flux, dt, grid: BlockGrid):
     """D (FLUXES,) = dt times the divergence of the fluxes of find_fluxes() in the cell number n of the band."""
+    b = block_of(band.cells[n], grid)
     for v in range(FLUXES):
         D[v] = 0.0
     for axis in range(DIMENSIONS):
         for side in range(2):
             between = band.aperture[n, 2 * axis + side]
             if between > 0.0:
-                rate = (2 * side - 1) * real(dt / grid.spacing[axis]) * between
+                rate = (2 * side - 1) * real(dt / grid.spacing[b, axis]) * between
                 shared = side == 1 and band.above[n, axis] >= 0
                 m, first = (band.above[n, axis] if shared else n), (2 * axis + (0 if shared else side)) * FLUXES
                 for v in range(FLUXES):
@@ -318,9 +320,9 @@ def advance_band(
 
 @helper
 def stop_at_wall(walls: Walls, at, axis, dt, P, T, grid: BlockGrid):
-    """Set rises T around the face between a cell and the next along `axis` to 0, or to the weight of a body force,
+    """Set increments T around the face between a cell and the next along `axis` to 0, or to the weight of a body force,
     where one of the cells that make them is covered or behind a closed face; returns the aperture of the face."""
-    step = grid.steps[axis]
+    step, h = grid.steps[axis], grid.spacing[block_of(at, grid), axis]
     between = aperture_between(walls, at + step, axis, grid)
     for c in range(2):
         beyond = aperture_between(walls, at + 2 * c * step, axis, grid)
@@ -328,7 +330,7 @@ def stop_at_wall(walls: Walls, at, axis, dt, P, T, grid: BlockGrid):
             for v in range(VARIABLES):
                 T[2 * v + c] = 0.0
             if HYDROSTATIC:
-                T[2 * (PHASES + DIMENSIONS) + c] = 0.5 * fall_along(axis, dt, grid) * density_at(P, LINE + 1 + c, BOX)
+                T[2 * (PHASES + DIMENSIONS) + c] = 0.5 * fall_along(axis, dt, dt / h) * density_at(P, LINE + 1 + c, BOX)
     return between
 
 
@@ -343,12 +345,13 @@ def account_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls,
         n = chosen[m]
         axis, high = side[n] // 2, side[n] % 2
         low_cell = side_cells[n] if high == 1 else side_cells[n] - grid.steps[axis]
-        amount = (2 * high - 1) * (weight * cell_volume(grid) / grid.spacing[axis])
+        b = block_of(low_cell, grid)
+        amount = (2 * high - 1) * (weight * cell_volume(b, grid) / grid.spacing[b, axis])
         for seen in range(2):  # first as the stage does, which sees no wall
             look_at_face(U, low_cell, axis, dt, grid, P, T)
             if seen == 1:
                 amount = -amount * stop_at_wall(walls, low_cell, axis, dt, P, T, grid)
             if amount != 0.0:
-                flux_of_face(P, T, F, dt, axis, grid)
+                flux_of_face(P, T, F, dt / grid.spacing[b, axis], axis)
                 for v in range(PHASES + DIMENSIONS + 1):
                     passed[n, v] += amount * load(F, 2 * position_of(v, axis))

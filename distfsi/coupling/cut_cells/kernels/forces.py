@@ -13,7 +13,15 @@ from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, LANES, PHASES, VARIABLES
 from distfsi.formulas.tensors import dot
-from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_volume, center_of, first_value, index_of, step_to
+from distfsi.mesh.kernels.grid import (
+    BlockGrid,
+    block_of,
+    block_size,
+    cell_volume,
+    center_of_cell,
+    first_value,
+    step_to,
+)
 
 # ---- the wall's velocity --------------------------------------------------------------------------------------------
 
@@ -43,13 +51,13 @@ def find_momentum(begin, end, width, mass, velocity, momentum):
 
 @helper
 def cells_near(points, band, walled, first, last, radius, grid: BlockGrid):
-    """How many of the cells `walled` (places in the band) from `first` on, before `last`, are computed side by side:
+    """How many of the cells `walled` (indices in the band) from `first` on, before `last`, are computed side by side:
     their centers are put to `points` (D, LANES), whose remaining ones repeat one of them."""
-    x, n = center_of(index_of(band[walled[first]], grid), grid), 1
-    while first + n < last and are_near(x, center_of(index_of(band[walled[first + n]], grid), grid), radius):
+    x, n = center_of_cell(band[walled[first]], grid), 1
+    while first + n < last and are_near(x, center_of_cell(band[walled[first + n]], grid), radius):
         n += 1
     for i in range(LANES):
-        put_point(points, i, center_of(index_of(band[walled[first + min(i, n - 1)]], grid), grid))
+        put_point(points, i, center_of_cell(band[walled[first + min(i, n - 1)]], grid))
     return n
 
 
@@ -87,7 +95,7 @@ def find_transfer(begin, end, band, loads: WallLoads, transfer, grid: BlockGrid)
     cells = block_size(grid)
     for n in range(begin, end):
         at = first_value(band[n], DIMENSIONS + 1, cells)
-        per_mass = cell_volume(grid) / loads.inertia[n] if loads.inertia[n] > 0.0 else 0.0
+        per_mass = cell_volume(block_of(band[n], grid), grid) / loads.inertia[n] if loads.inertia[n] > 0.0 else 0.0
         for d in static_range(DIMENSIONS):
             store(transfer, at + d * cells, loads.impulse[n, d] * per_mass)
         store(transfer, at + DIMENSIONS * cells, loads.added[n] * per_mass)

@@ -10,7 +10,16 @@ from distfsi.device.markers import driver, helper, load, real, store, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, PHASES, VARIABLES, primitives, sound_speed
 from distfsi.formulas.tensors import dot
-from distfsi.mesh.kernels.grid import BlockGrid, BlockTable, block_at, block_size, cell_at, cell_volume, first_value
+from distfsi.mesh.kernels.grid import (
+    BlockGrid,
+    BlockTable,
+    block_at,
+    block_of,
+    block_size,
+    cell_at,
+    cell_volume,
+    first_value,
+)
 from distfsi.mesh.kernels.search import Bins, bins_around, particles_of_row
 
 # What a particle is: part of a wall; lone, but still pushed by the wall that it was when the step began; lone.
@@ -78,18 +87,18 @@ def mark_lone(begin, end, lone, mark):
 @helper
 def cell_of(position, n, grid: BlockGrid, table: BlockTable):
     """Flat index of the cell of this rank that a particle is in, -1 if that is none of the grid's."""
+    b = block_at(position, n, grid, table) - table.first
     inside = True
-    ix, iy, iz = int(floor((position[n, 0] - grid.lower[0]) / grid.spacing[0])), 0, 0
+    ix, iy, iz = int(floor((position[n, 0] - grid.lower[0]) / grid.spacing[b, 0])), 0, 0
     inside = inside and ix >= 0 and ix < grid.cells[0]
     if DIMENSIONS > 1:
-        iy = int(floor((position[n, 1] - grid.lower[1]) / grid.spacing[1]))
+        iy = int(floor((position[n, 1] - grid.lower[1]) / grid.spacing[b, 1]))
         inside = inside and iy >= 0 and iy < grid.cells[1]
     if DIMENSIONS > 2:
-        iz = int(floor((position[n, 2] - grid.lower[2]) / grid.spacing[2]))
+        iz = int(floor((position[n, 2] - grid.lower[2]) / grid.spacing[b, 2]))
         inside = inside and iz >= 0 and iz < grid.cells[2]
     at = -1
     if inside:
-        b = block_at(position, n, grid, table) - table.first
         at = cell_at(b, ix - grid.origin[b, 0], iy - grid.origin[b, 1], iz - grid.origin[b, 2], grid)
     return at
 
@@ -98,7 +107,7 @@ def cell_of(position, n, grid: BlockGrid, table: BlockTable):
 def pressure_slope(U, walls: Walls, at, axis, grid: BlockGrid):
     """How the pressure changes [Pa/m] along an axis: between the neighbours behind open faces of a cell, or the cell
     and the only one."""
-    cells, step, h = block_size(grid), grid.steps[axis], grid.spacing[axis]
+    cells, step, h = block_size(grid), grid.steps[axis], grid.spacing[block_of(at, grid), axis]
     low = at - step if aperture_between(walls, at, axis, grid) > 0.0 else at
     high = at + step if aperture_between(walls, at + step, axis, grid) > 0.0 else at
     W_low, W_high = primitives(state_at(U, low, cells)), primitives(state_at(U, high, cells))
@@ -154,7 +163,8 @@ def add_following(sums, n, lone: LonePoints, bins: Bins, velocity, grid: BlockGr
         sums[v] = 0.0
     # particles in the same cell are no farther apart than a cell
     x = tuple(lone.position[n, d] for d in static_range(DIMENSIONS))
-    bx, by, bz = bins_around(x, tuple(grid.spacing[d] for d in static_range(DIMENSIONS)), bins)
+    b = block_of(lone.cell[n], grid)
+    bx, by, bz = bins_around(x, tuple(grid.spacing[b, d] for d in static_range(DIMENSIONS)), bins)
     for k in range(bz[0], bz[1]):
         for j in range(by[0], by[1]):
             start, stop = particles_of_row(bx, j, k, bins)
@@ -182,7 +192,7 @@ def drag(begin, end, lone: LonePoints, bins: Bins, velocity, states: States, imp
             at = lone.cell[n]
             add_following(sums, n, lone, bins, velocity, grid)
             state = state_at(states.U, at, cells)
-            filled = load(states.volume, volume_at(at, cells)) * cell_volume(grid)
+            filled = load(states.volume, volume_at(at, cells)) * cell_volume(block_of(at, grid), grid)
             held = filled * sum(state[k] for k in static_range(PHASES))
             kept = held / (held + sums[0])
             # their common velocity
@@ -199,18 +209,19 @@ def drag(begin, end, lone: LonePoints, bins: Bins, velocity, states: States, imp
 
 @helper
 def add_work(paid, n, lone: LonePoints, bins: Bins, velocity, mass, impulse, grid: BlockGrid):
-    """paid[n] (D + 1,) = impulse and work of all lone particles in the cell of one of them; returns the first of them,
-    -1 if there is no fluid in the cell."""
+    """paid[n] (D + 1,) = impulse and work of all lone particles in the cell of one of them; returns the first of
+    them."""
     first = -1
     # particles in the same cell are no farther apart than a cell
     x = tuple(lone.position[n, d] for d in static_range(DIMENSIONS))
-    bx, by, bz = bins_around(x, tuple(grid.spacing[d] for d in static_range(DIMENSIONS)), bins)
+    b = block_of(lone.cell[n], grid)
+    bx, by, bz = bins_around(x, tuple(grid.spacing[b, d] for d in static_range(DIMENSIONS)), bins)
     for k in range(bz[0], bz[1]):
         for j in range(by[0], by[1]):
             start, stop = particles_of_row(bx, j, k, bins)
             for m in range(start, stop):
                 q = bins.order[m]
-                if lone.cell[n] >= 0 and lone.cell[q] == lone.cell[n]:
+                if lone.cell[q] == lone.cell[n]:
                     first = q if first < 0 else first
                     for d in static_range(DIMENSIONS):
                         J = impulse[lone.rows[q], d]
@@ -228,11 +239,13 @@ def pay_drag(begin, end, lone: LonePoints, bins: Bins, velocity, mass, impulse, 
         for d in range(DIMENSIONS + 1):
             paid[n, d] = 0.0
         # what all of a cell get
-        first = add_work(paid, n, lone, bins, velocity, mass, impulse, grid)
+        first = -1
+        if lone.cell[n] >= 0:
+            first = add_work(paid, n, lone, bins, velocity, mass, impulse, grid)
         # momentum and energy of its gas, once
         if first == n:
             at = lone.cell[n]
-            filled = load(states.volume, volume_at(at, cells)) * cell_volume(grid)
+            filled = load(states.volume, volume_at(at, cells)) * cell_volume(block_of(at, grid), grid)
             for d in static_range(DIMENSIONS + 1):
                 amount = first_value(at, VARIABLES, cells) + (PHASES + d) * cells
                 store(states.U, amount, load(states.U, amount) - paid[n, d] / filled)

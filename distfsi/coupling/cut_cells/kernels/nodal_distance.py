@@ -10,7 +10,7 @@ from distfsi.coupling.kernels.interpolation import Cloud, are_near, put_point, s
 from distfsi.device.markers import driver, helper, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, LANES
-from distfsi.mesh.kernels.grid import BlockGrid, ghosts
+from distfsi.mesh.kernels.grid import BlockGrid, ghosts, middle_of
 from distfsi.mesh.kernels.search import Bins, any_particle
 
 STRETCH = 8  # nodes of a row that are left out together where no particle is near
@@ -79,7 +79,7 @@ def position_of(b, i, j, k, grid: BlockGrid):
         mirrored(grid.origin[b, 1] + j, grid.cells[1]),
         mirrored(grid.origin[b, 2] + k, grid.cells[2]),
     )
-    return tuple(grid.lower[d] + index[d] * grid.spacing[d] for d in static_range(DIMENSIONS))
+    return tuple(grid.lower[d] + index[d] * grid.spacing[b, d] for d in static_range(DIMENSIONS))
 
 
 @helper
@@ -100,14 +100,10 @@ def find_near(begin, end, near, search, bins: Bins, grid: BlockGrid):
     particles change distances."""
     layers = ghosts()[0]
     for b in range(begin, end):
-        middle = tuple(
-            grid.lower[d] + (grid.origin[b, d] + 0.5 * grid.extent[b, d]) * grid.spacing[d]
-            for d in static_range(DIMENSIONS)
-        )
         reach = tuple(
-            (0.5 * grid.extent[b, d] + 1.0 * layers) * grid.spacing[d] + search for d in static_range(DIMENSIONS)
+            (0.5 * grid.extent[b, d] + 1.0 * layers) * grid.spacing[b, d] + search for d in static_range(DIMENSIONS)
         )
-        if near[b] > 0 or any_particle(middle, reach, bins):
+        if near[b] > 0 or any_particle(middle_of(b, grid), reach, bins):
             near[b] = NEAR
 
 
@@ -166,9 +162,9 @@ def distance_of(filled, profile, radius):
 
 
 @helper
-def off_node(distance, grid: BlockGrid):
-    """A distance [m] that does not put the wall onto a node."""
-    minimum = SMALLEST * grid.spacing[0]
+def off_node(distance, at, grid: BlockGrid):
+    """A distance [m] that does not put the wall onto a node `at`."""
+    minimum = SMALLEST * grid.spacing[node_row(at // (grid.shape[2] + more_nodes()[0]), grid)[0], 0]
     return minimum if abs(distance) < minimum else distance
 
 
@@ -196,7 +192,8 @@ def find_distances(begin, end, chosen, distance, radius, profile, particles: Clo
             count = nodes_near(points, chosen, first, last, radius, grid)
             sum_around_points(filled, weight, around, points, radius, 1, particles)
             for i in range(count):
-                distance[chosen[first + i]] = off_node(distance_of(filled[i], profile, radius), grid)
+                at = chosen[first + i]
+                distance[at] = off_node(distance_of(filled[i], profile, radius), at, grid)
             first += count
 
 
@@ -218,5 +215,5 @@ def add_spheres(begin, end, chosen, distance, largest, reach, particles: Cloud, 
                 nearest_spheres(nearest, around, points, wide, reach, particles)
             for i in range(count):
                 at = chosen[first + i]
-                distance[at] = min(distance[at], off_node(nearest[i], grid))
+                distance[at] = min(distance[at], off_node(nearest[i], at, grid))
             first += count

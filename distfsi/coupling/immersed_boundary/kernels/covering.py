@@ -5,7 +5,7 @@ from distfsi.coupling.kernels.interpolation import Cloud, sum_around
 from distfsi.device.markers import driver, helper, load, workspace
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, PHASES, VARIABLES
-from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, center_of, first_value, index_of
+from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, center_of_cell, first_value, middle_of
 from distfsi.mesh.kernels.search import Bins, any_particle
 from distfsi.solid.kernels.records import DENSITY, MASS, VELOCITY
 
@@ -26,12 +26,8 @@ def find_amounts(begin, end, state, volume, momentum):
 @helper
 def any_near(block, radius, bins: Bins, grid: BlockGrid):
     """Whether there may be particles within `radius` of a block."""
-    middle = tuple(
-        grid.lower[d] + (grid.origin[block, d] + 0.5 * grid.extent[block, d]) * grid.spacing[d]
-        for d in static_range(DIMENSIONS)
-    )
-    reach = tuple(0.5 * grid.extent[block, d] * grid.spacing[d] + radius for d in static_range(DIMENSIONS))
-    return any_particle(middle, reach, bins)
+    reach = tuple(0.5 * grid.extent[block, d] * grid.spacing[block, d] + radius for d in static_range(DIMENSIONS))
+    return any_particle(middle_of(block, grid), reach, bins)
 
 
 @driver
@@ -52,7 +48,7 @@ def cover(begin, end, kind, occupied, U, lost, radius, particles: Cloud, grid: B
                 for i in range(grid.extent[b, 0]):
                     # how much of the kernel is filled
                     at = cell_at(b, i, j, k, grid)
-                    sum_around(sums, center_of(index_of(at, grid), grid), radius, particles)
+                    sum_around(sums, center_of_cell(at, grid), radius, particles)
                     # what the cell becomes, and what it loses
                     before = kind[at]
                     if sums[0] >= 0.5:
@@ -102,7 +98,7 @@ def find_depth(begin, end, kind, occupied, offsets, counts, grid: BlockGrid):
 
 @driver
 def list_cells(begin, end, kind, occupied, first, covered, deep, fresh, grid: BlockGrid):
-    """Write the cells of each kind, block by block, from the places first (blocks, 3) on."""
+    """Write the cells of each kind, block by block, from the indices first (blocks, 3) on."""
     for b in range(begin, end):
         if occupied[b] == 0:
             continue
@@ -131,7 +127,7 @@ def find_wall_velocity(begin, end, covered, velocity, inertia, radius, particles
     """
     sums = workspace(1 + DIMENSIONS)
     for n in range(begin, end):
-        sum_around(sums, center_of(index_of(covered[n], grid), grid), radius, particles)
+        sum_around(sums, center_of_cell(covered[n], grid), radius, particles)
         inertia[n] = sums[0]
         for d in static_range(DIMENSIONS):
             velocity[n, d] = sums[1 + d] / sums[0]

@@ -9,7 +9,7 @@ from distfsi.device.markers import driver, helper, load, store, workspace
 from distfsi.fluid.kernels.records import position_of
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import DIMENSIONS, FLUXES, PHASES, VARIABLES, conserved, primitives
-from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_volume, first_value
+from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, cell_volume, first_value
 
 
 class Surroundings(NamedTuple):
@@ -100,7 +100,7 @@ def find_contents(begin, end, fresh, U, content, grid: BlockGrid):
 def add_flux(passed, n, U, at, axis, dt, weight, grid: BlockGrid, P, T, F):
     """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`."""
     look_at_face(U, at, axis, dt, grid, P, T)
-    flux_of_face(P, T, F, dt, axis, grid)
+    flux_of_face(P, T, F, dt / grid.spacing[block_of(at, grid), axis], axis)
     for v in range(PHASES + DIMENSIONS + 1):
         passed[n, v] += weight * load(F, 2 * position_of(v, axis))
 
@@ -113,9 +113,9 @@ def collect_wall(begin, end, covered, passed, U, kind, dt, weight, grid: BlockGr
     """
     P, T, F = workspace(BOX * VARIABLES), workspace(2 * VARIABLES), workspace(2 * FLUXES + 2)
     for n in range(begin, end):
-        at = covered[n]
+        at, b = covered[n], block_of(covered[n], grid)
         for axis in range(DIMENSIONS):
-            step, area = grid.steps[axis], weight * cell_volume(grid) / grid.spacing[axis]
+            step, area = grid.steps[axis], weight * cell_volume(b, grid) / grid.spacing[b, axis]
             if kind[at - step] < COVERED:
                 add_flux(passed, n, U, at - step, axis, dt, area, grid, P, T, F)
             if kind[at + step] < COVERED:
@@ -129,7 +129,8 @@ def collect_sides(begin, end, side_cells, side, passed, U, kind, dt, weight, gri
     for n in range(begin, end):
         at, axis = side_cells[n], side[n] // 2
         if kind[at] >= COVERED:
-            high, area = side[n] % 2, weight * cell_volume(grid) / grid.spacing[axis]
+            high, b = side[n] % 2, block_of(at, grid)
+            area = weight * cell_volume(b, grid) / grid.spacing[b, axis]
             before = at if high == 1 else at - grid.steps[axis]
             add_flux(passed, n, U, before, axis, dt, (2 * high - 1) * area, grid, P, T, F)
 

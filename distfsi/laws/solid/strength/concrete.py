@@ -14,7 +14,7 @@ class Concrete(Strength):
     """Concrete of Holmquist, Johnson & Cook: yield at f_c (A (1 - D) + B p*^N)(1 + C ln(rate/reference_rate)), at
     most cap f_c. It needs the eos `compaction`; cracks in tension come from a `failure`.
 
-    Plastic and compacted strain over max(D1 (p* + T*)^D2, least_failure_strain) sum up to the accumulated damage D.
+    Plastic and compacted strain over max(D1 (p* + T*)^D2, minimum_failure_strain) sum up to the accumulated damage D.
     Without a failure model no tension beyond (1 - D) tensile_strength is carried; with one, cracks limit it instead.
     """
 
@@ -30,7 +30,7 @@ class Concrete(Strength):
     cap: float = number("largest strength over f_c", above=0.0, default=7.0)
     D1: float = number("damage: failure strain D1 (p* + T*)^D2", above=0.0)
     D2: float = number("its exponent", at_least=0.0, default=1.0)
-    least_failure_strain: float = number("and its floor", above=0.0)
+    minimum_failure_strain: float = number("and its floor", above=0.0)
     reference_rate: float = quantity("1/s", "strain rate at which the rate factor is one", above=0.0, default=1.0)
 
     columns = (PLASTIC_STRAIN, Column("accumulated_damage", "1", "plastic and compacted strain over those at failure"))
@@ -70,7 +70,7 @@ class Concrete(Strength):
     def failure_strain(self, pressure):
         """Plastic and compacted strain at which nothing but friction is left (A.11 with the floor)."""
         normal = max((pressure + self.tensile_strength) / self.compressive_strength, 0.0)
-        return max(self.D1 * pow(normal, self.D2), self.least_failure_strain)
+        return max(self.D1 * pow(normal, self.D2), self.minimum_failure_strain)
 
     def carried_share(self, pressure, damage):
         """Closed cracks carry by friction."""
