@@ -382,7 +382,7 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
         (
             ["gauges.a={kind='pont', position=0}"],
-            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'particle', 'plane', 'line'; "
             "did you mean 'point'?",
         ),
         (
@@ -457,7 +457,7 @@ def test_the_load_on_a_wall(wall):
     assert face["peak_overpressure [Pa]"] == pytest.approx(np.maximum.accumulate(np.maximum(over, 0.0))[at], abs=1e-12)
     _, fields, _, _ = read_cells(series(wall / "gauges/face", "cells")[-1][1])
     assert fields["impulse"].shape == (1, 5, 1)
-    assert fields["impulse"].ravel() == pytest.approx(point["impulse [Pa s]"][-1], rel=1e-9)
+    assert fields["impulse"].ravel() == pytest.approx(point["impulse [Pa s]"][at[-1]], rel=1e-9)
     assert set(fields) == {"overpressure", "peak_overpressure", "impulse"}
 
 

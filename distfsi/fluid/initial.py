@@ -221,6 +221,6 @@ class InitialState:
                 slope, (known.pressure, way[-1]), [known.density], method="LSODA", t_eval=way, rtol=1e-9, atol=1e-12
             )
             reached = dict(zip(way.tolist(), path.y[0].tolist(), strict=False))
-            places = pressures > known.pressure if way[-1] > known.pressure else pressures < known.pressure
-            found[places] = [reached.get(p, np.nan) for p in pressures[places].tolist()]
+            on_way = pressures > known.pressure if way[-1] > known.pressure else pressures < known.pressure
+            found[on_way] = [reached.get(p, np.nan) for p in pressures[on_way].tolist()]
         return found

@@ -210,8 +210,8 @@ def main(
     done = {name: found for name, found in before.items() if before.items() >= result.items() and name not in result}
     for number, (name, work, measure) in enumerate(chosen, 1):
         if communicator.rank == 0:
-            told = "was measured before" if name in done else "..."
-            print(f"{number} of {len(chosen)}: {name} {told}", file=sys.stderr, flush=True)
+            state = "was measured before" if name in done else "..."
+            print(f"{number} of {len(chosen)}: {name} {state}", file=sys.stderr, flush=True)
         result[name] = done[name] if name in done else measure(work(), communicator, threads, seconds)
         if communicator.rank == 0 and only is None:
             _write(_partial_file(), result)

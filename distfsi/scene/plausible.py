@@ -25,12 +25,12 @@ def far_outside(fluid: Fluid | None, bodies: tuple[Body, ...]) -> Iterator[str]:
         phase, state = fluid.phases[region.state.phase], region.state
         where = f"fluid.regions.{number} ('{phase.name}')"
         if isinstance(phase.eos, Jwl):
-            yield from _told(where, "density", state.density, EXPLOSIVES, "explosives", "kg/m3")
+            yield from _beyond(where, "density", state.density, EXPLOSIVES, "explosives", "kg/m3")
             e = energy(phase.eos, state.density, state.pressure)
             if region.shape is not None and not DETONATIONS[0] / FAR <= e <= 2.0 * DETONATIONS[1]:
                 yield f"{where}: an energy of {e:.3g} J/kg; explosives have 3e6 to 1.2e7 J/kg (not J/m3)"
         if isinstance(phase.eos, StiffenedGas) and phase.eos.p_inf > LIQUID_STIFFNESS:
-            yield from _told(where, "density", state.density, LIQUIDS, "liquids", "kg/m3")
+            yield from _beyond(where, "density", state.density, LIQUIDS, "liquids", "kg/m3")
     for body in bodies:
         yield from _body(body)
 
@@ -38,7 +38,7 @@ def far_outside(fluid: Fluid | None, bodies: tuple[Body, ...]) -> Iterator[str]:
 def _body(body: Body) -> Iterator[str]:
     where, sound = f"body '{body.name}'", solid_sound(body)
     if sound > STIFF:
-        yield from _told(where, "density", body.density, SOLIDS, "solids", "kg/m3")
+        yield from _beyond(where, "density", body.density, SOLIDS, "solids", "kg/m3")
     if SOLIDS[0] <= body.density <= SOLIDS[1] and not SOUND[0] / FAR <= sound <= SOUND[1] * FAR**0.5:
         yield (
             f"{where}: its moduli and its density make sound {sound:.3g} m/s fast; known solids have "
@@ -49,7 +49,7 @@ def _body(body: Body) -> Iterator[str]:
         yield f"{where}: failure.D3 = {d3:g} makes it tougher in tension than in compression; of metals it is negative"
 
 
-def _told(where: str, what: str, value: float, known: tuple[float, float], kind: str, unit: str) -> Iterator[str]:
+def _beyond(where: str, what: str, value: float, known: tuple[float, float], kind: str, unit: str) -> Iterator[str]:
     low, high = known
     if not low / FAR <= value <= high * FAR:
         yield f"{where}: a {what} of {value:.4g} {unit}; known {kind} have {low:g} to {high:g} {unit}"

@@ -243,7 +243,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
     const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
     real fall[3] = {0, 0, 0};
-    find_falls(numbers, step_dt, step_x, step_y, step_z, fall);
+    find_falls(numbers, dt, step_x, step_y, step_z, fall);
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
     // primitives of the first planes, and fluxes through the low side along z
