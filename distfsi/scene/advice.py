@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 from distfsi.scene.warnings import warnings
@@ -81,7 +81,7 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
 
 
 def thickness(body: Body, domain: Domain) -> float | None:
-    """Smallest extent of a body inside the domain [m]; None for a half space, which has none."""
+    """Smallest extent of a body inside the domain [m]; None for a half space and for what is composed."""
     if isinstance(body.shape, Box):
         low, high = np.maximum(body.shape.lower, domain.lower), np.minimum(body.shape.upper, domain.upper)
         return float(np.min(high - low))
@@ -156,6 +156,8 @@ def _turns_around(scene: Scene, axis: int) -> bool:
     shapes, domain = _shapes(scene), scene.domain
     centers = {tuple(s.center[a] for a in across) for s in shapes if isinstance(s, Ball | Tube)}
     flat = [s for s in shapes if isinstance(s, HalfSpace | Box)]
+    if any(isinstance(s, Composed) for s in shapes):
+        return False
     if len(centers) != 1 or not all(_spans(shape, domain, a) for shape in flat for a in across):
         return False
     (center,) = centers

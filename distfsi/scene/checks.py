@@ -13,10 +13,11 @@ from distfsi.gauges import Gauge
 from distfsi.laws.law import Source
 from distfsi.laws.registry import word_of
 from distfsi.scene.build import AXES, SIDES, build_sources
+from distfsi.scene.cloud import Cloud
 from distfsi.scene.description import (
     Ball,
     Body,
-    Box,
+    Composed,
     Cylinder,
     Domain,
     Fluid,
@@ -201,11 +202,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
     if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
         yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
-    if turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
+    if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
+        yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
+    elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
         yield Fault((*path, "lattice_angle"), "needs packing = 'lattice', another shape than a half space, 2D or 3D")
     elif turned and _cut_off_axis(shape, domain):
         yield Fault((*path, "lattice_angle"), "a turned lattice has no symmetry planes; expected a whole body")
-    if body.radial_velocity and isinstance(shape, Box | HalfSpace):
+    if body.packing == "relaxed" and isinstance(shape, HalfSpace):
+        yield Fault((*path, "packing"), "a half space has no relaxed packing; expected 'lattice'")
+    if body.radial_velocity and not isinstance(shape, Ball | Tube | Cylinder):
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
@@ -237,6 +242,8 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [2.0 * radius] * domain.dimensions
         case Cylinder(start, end, outer, inner):
             extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
+        case Cloud() as cloud:
+            return float(len(cloud.positions))
         case shape:
             lower, upper = bounding_box(shape)
             extents = list(np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower))
@@ -252,7 +259,7 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         slack = 1e-6 * body.spacing
         beyond = (lower[axis] < domain.lower[axis] - slack, upper[axis] > domain.upper[axis] + slack)
         for side in range(2):
-            if beyond[side] and ends[side] != "symmetry":
+            if beyond[side] and math.isfinite((lower, upper)[side][axis]) and ends[side] != "symmetry":
                 where = f"the {SIDES[side]} {AXES[axis]} end of the domain"
                 yield Fault(path, f"reaches beyond {where}, which is '{ends[side]}'; only 'symmetry' may cut a body")
 

@@ -5,9 +5,12 @@ Vectors have one entry per dimension of the domain. Sides are (axis, 0 = low end
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
+
+import numpy as np
 
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
@@ -18,7 +21,7 @@ RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Reconstruction = Literal["first_order", "minmod", "van_leer", "weno5"]
 TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
-Packing = Literal["lattice", "rings"]
+Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
@@ -70,7 +73,34 @@ class Cylinder:
     inner_radius: float
 
 
-Shape = Box | Ball | HalfSpace | Tube | Cylinder
+class Composed(ABC):
+    """A shape made of others, or read from a file. It brings its own geometry; that of the five above, of which it is
+    made, is in scene/shapes.py. Frozen and hashable."""
+
+    @property
+    @abstractmethod
+    def dimensions(self) -> int:
+        """Number of its coordinates."""
+
+    @property
+    @abstractmethod
+    def exact(self) -> bool:
+        """Whether `distance` is the true one, and not only a bound of it from below."""
+
+    @abstractmethod
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance [m] of `points` (n, D) to the surface, negative inside -> (n,): true, or nearer to zero."""
+
+    @abstractmethod
+    def support(self, normal: np.ndarray) -> float:
+        """How far the shape reaches along `normal` (D,) of length 1 [m]; for some a bound from above."""
+
+    @abstractmethod
+    def volume(self) -> float:
+        """Length, area or volume [m, m2, m3]."""
+
+
+Shape = Box | Ball | HalfSpace | Tube | Cylinder | Composed
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
@@ -135,8 +165,8 @@ class Body:
 
     Particles inside `fixed` (if any) keep fixed_velocity [m/s]. To `velocity` comes radial_velocity [m/s], outward at
     the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
-    `packing` (None: what suits the shape): rings along the surface or a lattice, turned by lattice_angle [rad] about a
-    cylinder's axis or the z axis. `form` (None: that of the solid).
+    `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
+    cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
     """
 
     name: str

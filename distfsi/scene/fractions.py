@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Box, HalfSpace, Shape
-from distfsi.scene.shapes import bounding_box, distance, smallest_extent
+from distfsi.scene.description import Composed, Shape
+from distfsi.scene.measure import parts_inside
+from distfsi.scene.shapes import bounding_box, distance, is_its_bounding_box, smallest_extent
 
 HALVINGS = 3  # of a cell that a curved or oblique surface may cut, along each axis, at least
 ACROSS = 16  # parts of a cell across the smallest extent of a shape
@@ -60,11 +61,12 @@ def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple
     """Fraction of each cell of a grid that lies inside `shape`, shape ([nz,] [ny,] nx).
 
     `centers` holds the cell centers along each axis, `spacing` the cell sizes [m]. Exact for boxes; otherwise cells
-    that the surface may cut are halved again and again, and what is left counts by its center. A cell's value depends
-    on its own center only, so it is the same however the domain is cut into blocks.
+    that the surface may cut are halved again and again, and what is left counts by its center; those of a composed
+    shape are cut by a plane (scene/measure.py). A cell's value depends on its own center only, so it is the same
+    however the domain is cut into blocks.
     """
     shape_of_grid = tuple(len(x) for x in reversed(centers))
-    if _is_its_bounding_box(shape):
+    if is_its_bounding_box(shape):
         lower, upper = bounding_box(shape)
         return _outer_product([_overlap(*args) for args in zip(lower, upper, centers, spacing, strict=True)])
     grids = np.meshgrid(*reversed(centers), indexing="ij")
@@ -72,7 +74,10 @@ def cell_fractions(shape: Shape, centers: tuple[np.ndarray, ...], spacing: tuple
     signed = distance(shape, points)
     fractions = (signed < 0.0).astype(np.float64)
     cut = np.flatnonzero(np.abs(signed) < 0.5001 * math.hypot(*spacing))
-    fractions[cut] = _halved(shape, points[cut], spacing)
+    if isinstance(shape, Composed):
+        fractions[cut], _ = parts_inside(shape.distance, points[cut], signed[cut], np.asarray(spacing))
+    else:
+        fractions[cut] = _halved(shape, points[cut], spacing)
     return fractions.reshape(shape_of_grid)
 
 
@@ -102,15 +107,6 @@ def _halvings(shape: Shape, spacing: tuple[float, ...]) -> int:
     across = max(b - a for a, b in zip(lower, upper, strict=True))
     part = max(smallest / ACROSS, across / LARGEST)
     return max(HALVINGS, math.ceil(math.log2(max(spacing) / part)))
-
-
-def _is_its_bounding_box(shape: Shape) -> bool:
-    match shape:
-        case HalfSpace(_, normal):
-            return sum(n != 0.0 for n in normal) == 1
-        case Ball(center, _):
-            return len(center) == 1
-    return isinstance(shape, Box)
 
 
 def _overlap(lower: float, upper: float, centers: np.ndarray, spacing: float) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
+from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.loader import schema
 
 Json = Mapping[str, Any]
@@ -52,6 +53,7 @@ SECTIONS = {
     "`strength` of a body": _names(Strength),
     "`failure` of a body": (*_names(Failure), "Scatter"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
+    "Shapes made of others, and from files": tuple(table.__name__ for table in TABLES),
     "`[sources.NAME]`": _names(Source),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),

@@ -146,7 +146,7 @@ class BodyInput(Table):
     material: str | None = Field(
         None, description="name of a solid material (`distfsi materials`); the next keys change it"
     )
-    shape: Shape = Field(description="box, ball, half_space (cut to the domain), tube or cylinder")
+    shape: Shape = Field(description="what it fills; a half_space is cut to the domain")
     spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
     density: Density = Field(description="density at rest")
     velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
@@ -162,7 +162,9 @@ class BodyInput(Table):
         0.0, description="initial speed away from center or axis at the surface; hollow bodies: the inner one"
     )
     packing: description.Packing | None = Field(
-        None, description="lattice, or rings along the surface (tube in 2D, cylinder, ball in 2D); default what suits"
+        None,
+        description="lattice; rings along the surface (tube in 2D, cylinder, ball in 2D); or relaxed: particles that "
+        "pushed each other apart; default what suits",
     )
     lattice_angle: quantity("rad") = Field(
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
@@ -294,10 +296,12 @@ class Input(Sections):
     time: TimeInput
 
 
-def context_of(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What validation must know of the whole input `data`: its dimensions (None: not clear) and its phase names."""
+def context_of(data: Mapping[str, Any], folder: str) -> dict[str, Any]:
+    """What validation must know of the whole input `data`: its dimensions (None: not clear), its phase names, and the
+    folder from which the names of files count."""
     domain, fluid = data.get("domain"), data.get("fluid")
     cells = domain.get("cells") if isinstance(domain, dict) else None
     phases = fluid.get("phases") if isinstance(fluid, dict) else None
     dimensions = len(cells) if isinstance(cells, list) else 1 if isinstance(cells, int) else None
-    return {"dimensions": dimensions, "phases": tuple(phases) if isinstance(phases, dict) else ()}
+    names = tuple(phases) if isinstance(phases, dict) else ()
+    return {"dimensions": dimensions, "phases": names, "folder": folder}

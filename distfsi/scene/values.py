@@ -1,7 +1,7 @@
 """Kinds of values in an input: quantities with units, vectors, counts, names; and the tables that hold them.
 
-Validation gets a context {"dimensions": int | None, "phases": names}, taken from the raw input, so that vectors and
-names are checked where they stand.
+Validation gets a context {"dimensions": int | None, "phases": names, "folder": path}, taken from the raw input, so that
+vectors and names are checked where they stand.
 """
 
 from __future__ import annotations
