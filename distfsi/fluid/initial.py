@@ -13,6 +13,7 @@ from distfsi.fluid.kernels.rows import HALVINGS
 from distfsi.fluid.layers import Layers, is_layer
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.narrowing import of_kind
 from distfsi.scene.description import Fluid, FluidState, Shape
 from distfsi.scene.fractions import Filled, cell_fractions, corrected
 from distfsi.scene.shapes import bounding_box, contains, volume_within
@@ -125,8 +126,8 @@ class InitialState:
 
     def _layers(self, grid: Grid, level: float) -> Layers:
         """The pressures of the regions that lie across the domain and have the pressure of the first one."""
-        forces, first = self.model.body_force.acceleration, self.fluid.regions[0].state
-        (axis,) = [axis for axis in range(grid.dimensions) if forces[axis] != 0.0]
+        first, forces = self.fluid.regions[0].state, enumerate(self.model.body_force.acceleration)
+        ((axis, force),) = [(axis, of_kind(float, force)) for axis, force in forces if force != 0.0]
         middle = [np.array([0.5 * (a + b)]) for a, b in zip(grid.lower, grid.upper, strict=True)][: grid.dimensions]
         middle[axis] = grid.lower[axis] + (np.arange(grid.cells[axis]) + 0.5) * grid.spacing[axis]
         centers, spacing = tuple(middle), grid.spacing[: grid.dimensions]
@@ -143,7 +144,7 @@ class InitialState:
                 found = part * masses.sum(axis=0) + (1.0 - part) * found
             return found
 
-        return Layers.at_rest(grid, forces, level, first.pressure, densities_of)
+        return Layers.at_rest(grid, (axis, force), level, first.pressure, densities_of)
 
     def _pressure(self, U: np.ndarray) -> np.ndarray:
         return self._primitives(U)[self.model.phases + self.model.dimensions]
@@ -184,8 +185,9 @@ class InitialState:
         for region in self.fluid.regions:
             inside = np.full(len(positions), True) if region.shape is None else contains(region.shape, positions)
             of_region = self._states(region.state)
-            layered = self.layers is not None and of_region.shape[1] > 1
-            states[:, inside] = of_region[:, self.layers.index(positions[inside])] if layered else of_region
+            if self.layers is not None and of_region.shape[1] > 1:
+                of_region = of_region[:, self.layers.index(positions[inside])]
+            states[:, inside] = of_region
         return states
 
     def _fraction(self, state: FluidState) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,18 +27,17 @@ class Layers:
     def at_rest(
         cls,
         grid: Grid,
-        forces: Sequence[float],
+        force: tuple[int, float],
         level: float,
         pressure: float,
         densities_of: Callable[[np.ndarray], np.ndarray],
     ) -> Layers:
-        """Under the body force [m/s2], along one axis, with the `pressure` [Pa] at the coordinate `level` [m].
+        """Under a `force` along an axis [m/s2], with the `pressure` [Pa] at the coordinate `level` [m].
 
         densities_of (n,) -> (n,): of the layers at pressures. From layer to layer the pressure grows by the mean of
         their densities times g h (fluid/formulas/hydrostatics.py). Raises InputError where there is no such state.
         """
-        (axis,) = [axis for axis in range(grid.dimensions) if forces[axis] != 0.0]
-        fall = forces[axis] * grid.spacing[axis]
+        axis, fall = force[0], force[1] * grid.spacing[force[0]]
         index = (level - grid.lower[axis]) / grid.spacing[axis] - 0.5
         start = int(np.clip(round(index), 0, grid.cells[axis] - 1))
         pressures = np.full(grid.cells[axis], float(pressure))

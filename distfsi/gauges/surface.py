@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,9 +42,10 @@ class SurfaceProbe(LayerProbe):
     """
 
     def __init__(self, gauge: SurfaceGauge, run: Run):
-        axis, grid = AXES.index(gauge.side[0]), run.blocks.grid
+        name: Any = gauge.side[0]
+        axis, grid = AXES.index(name), run.blocks.grid
         at = grid.upper[axis] if gauge.side.endswith("high") else grid.lower[axis]
-        self.layer = PlaneProbe(PlaneGauge(gauge.side[0], at, None), run).layer
+        self.layer = PlaneProbe(PlaneGauge(name, at, None), run).layer
         thin = self.layer.grid
         axes = [low + (np.arange(n) + 0.5) * h for low, n, h in zip(thin.lower, thin.cells, thin.spacing, strict=True)]
         self._shape = thin.cells[::-1]

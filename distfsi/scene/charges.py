@@ -102,10 +102,10 @@ def _volumes(scene: Scene, number: int, shape: Shape) -> tuple[float, float]:
     sampled = cell_fractions(shape, centers, domain.spacing)
     part = corrected(sampled, Filled.by(sampled), None if exact is None else exact / cell)
     meant = cell * float(part.sum()) if exact is None else exact
-    hiding = [region.shape for region in present(scene.fluid).regions[number + 1 :]]
+    hiding: list[Shape] = [present(region.shape) for region in present(scene.fluid).regions[number + 1 :]]
     hiding += [body.shape for body in scene.solid.bodies] if scene.solid else []
     for other in hiding:
-        part = part * (1.0 - cell_fractions(present(other), centers, domain.spacing))
+        part = part * (1.0 - cell_fractions(other, centers, domain.spacing))
     return cell * float(part.sum()), meant
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.narrowing import present
 from distfsi.scene.description import Body, Fluid
 from distfsi.scene.thermodynamics import energy, solid_sound
 
@@ -22,7 +23,7 @@ LIQUID_STIFFNESS = 1e7  # Pa
 def far_outside(fluid: Fluid | None, bodies: tuple[Body, ...]) -> Iterator[str]:
     """A sentence for each constant that no known material comes near to."""
     for number, region in enumerate(fluid.regions if fluid else ()):
-        phase, state = fluid.phases[region.state.phase], region.state
+        phase, state = present(fluid).phases[region.state.phase], region.state
         where = f"fluid.regions.{number} ('{phase.name}')"
         if isinstance(phase.eos, Jwl):
             yield from _beyond(where, "density", state.density, EXPLOSIVES, "explosives", "kg/m3")
