@@ -36,6 +36,7 @@ from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import Restart, find_restart
 from distfsi.output.storage import on_root, storage
 from distfsi.scene.description import Scene
+from distfsi.scene.warnings import warnings
 from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.step import parts_of
 
@@ -103,6 +104,9 @@ def run(
     requests = Requests(directory / output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
     files = storage(output.hdf5, communicator)
     _refuse([*cache_faults(), *filter(None, [shortage(scene, communicator)])], communicator)
+    if communicator.rank == 0:
+        for text in warnings(scene):
+            print(f"warning: {text}", flush=True)
     progress = Progress(scene.time.end, communicator)
     for note in scene.notes:
         progress.say(note)

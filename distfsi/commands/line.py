@@ -8,6 +8,7 @@ at once.
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import sys
 from collections.abc import Sequence
@@ -70,8 +71,18 @@ def main(words: Sequence[str]) -> None:
 
 def with_command(words: Sequence[str]) -> list[str]:
     """The words, `run` before them where they begin with no command."""
-    is_scene = words and words[0] not in COMMANDS and not words[0].startswith("-")
-    return ["run", *words] if is_scene else list(words)
+    if not words or words[0] in COMMANDS or words[0].startswith("-"):
+        return list(words)
+    if near := _mistyped(words[0]):
+        parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
+    return ["run", *words]
+
+
+def _mistyped(word: str) -> str | None:
+    """The command that a word is meant to be, if it is no input file but resembles one."""
+    if "." in word or os.sep in word or os.path.exists(word):
+        return None
+    return next(iter(difflib.get_close_matches(word.lower(), COMMANDS, n=1)), None)
 
 
 def command() -> None:

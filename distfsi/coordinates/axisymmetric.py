@@ -14,3 +14,4 @@ class Axisymmetric(Cylindrical):
     dimensions = (2,)
     axes = "rz"
     whole = "all around the axis"
+    counted = 3

@@ -16,6 +16,7 @@ class Planar(Coordinates):
     radial = False
     axes = "xyz"
     whole = "the domain; in fewer than three dimensions per metre along those that are left out"
+    counted = None
 
     def area(self, r: Any) -> Any:
         return 1.0 + 0.0 * r

@@ -136,6 +136,18 @@ def mirrored(frame: Frame) -> Frame:
     return replace(frame, extent=(-right, right, bottom, top), cells=cells)
 
 
+def as_line(frame: Frame) -> Frame | None:
+    """A frame of one row or one column of cells as one of a line; None where there are more."""
+    count = next(iter(frame.cells.values())).shape[:2] if frame.cells else (0, 0)
+    left, right, bottom, top = frame.extent
+    if count[0] == 1:
+        return replace(frame, extent=(left, right, bottom, bottom))
+    if count[1] == 1:
+        cells = {name: np.swapaxes(values, 0, 1) for name, values in frame.cells.items()}
+        return replace(frame, cells=cells, extent=(bottom, top, left, left), axes=frame.axes[::-1])
+    return None
+
+
 def telling_plane(cells: Path, particles: Path) -> Plane | None:
     """The plane that shows most of the bodies in a pair of files: along their longest and their shortest edge, through
     their middle or, where they touch only the low end of the domain (of a half or a quarter, as a rule), along that
