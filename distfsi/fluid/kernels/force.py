@@ -10,7 +10,8 @@ from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, cell_volum
 @driver
 def account_force(begin, end, U, volumes, metrics, given, rows, time, grid: BlockGrid):
     """given[r] (D + 1,) grows by the momentum [N s] and the work [J] that the body force gives in `time` [s] to the
-    cells of row r in the states U, by their `volumes` and their columns' `metrics`; `rows`: of a block, along y; all rows of a block follow each other."""
+    cells of row r in the states U, by their `volumes` and their columns' `metrics`; `rows`: of a block, along y; all
+    rows of a block follow each other."""
     cells = block_size(grid)
     planes = len(given) // (len(grid.extent) * rows)
     for r in range(begin, end):
