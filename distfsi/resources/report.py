@@ -10,7 +10,7 @@ from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
 from distfsi.scene.advice import advice, thickness
-from distfsi.scene.charges import Charge, charges, distances, gap_between
+from distfsi.scene.placed_charges import Charge, charges, distances, gap_between
 from distfsi.scene.description import Body, Scene
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from distfsi.gauges import per_extent
-from distfsi.scene.charges import ENOUGH, Charge, charges, gap_between, losses
+from distfsi.scene.placed_charges import ENOUGH, Charge, charges, gap_between, losses
 from distfsi.scene.description import Body, Domain, Scene
 from distfsi.scene.plausible import far_outside
 

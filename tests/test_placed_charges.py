@@ -10,7 +10,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.resources.report import report
 from distfsi.scene import load
 from distfsi.scene.advice import advice
-from distfsi.scene.charges import LOSSES, charges, distances, losses
+from distfsi.scene.placed_charges import LOSSES, charges, distances, losses
 from distfsi.scene.signals import Layout
 from distfsi.scene.warnings import warnings
 from distfsi.simulation import Simulation
