@@ -16,6 +16,7 @@ from importlib import import_module
 
 from distfsi import __version__
 from distfsi.errors import DistfsiError, InputError
+from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
@@ -23,6 +24,7 @@ COMMANDS = (
     "compile",
     "plot",
     "info",
+    "clean",
     "examples",
     "materials",
     "blast",
@@ -63,25 +65,35 @@ def parser() -> argparse.ArgumentParser:
 
 def main(words: Sequence[str]) -> None:
     """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
-    if words and words[0] not in COMMANDS and not words[0].startswith("-"):
-        if near := _mistyped(words[0]):
-            parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
-        words = ["run", *words]
-    arguments = parser().parse_args(words)
+    if near := _mistyped(words[0] if words else ""):
+        parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
+    arguments = parser().parse_args(with_command(words))
     arguments.execute(arguments)
 
 
 def _mistyped(word: str) -> str | None:
-    """The command that a word is meant to be, if it is no input file but resembles one."""
-    if "." in word or os.sep in word or os.path.exists(word):
+    """The command that a word is meant to be, if it is none, and no input file, but resembles one."""
+    if word in COMMANDS or word.startswith("-") or "." in word or os.sep in word or os.path.exists(word):
         return None
     return next(iter(difflib.get_close_matches(word.lower(), COMMANDS, n=1)), None)
 
 
+def with_command(words: Sequence[str]) -> list[str]:
+    """The words, `run` before them where they begin with no command."""
+    is_scene = words and words[0] not in COMMANDS and not words[0].startswith("-")
+    return ["run", *words] if is_scene else list(words)
+
+
 def command() -> None:
-    """The console command: `main` on the words of the process; a wrong input ends it with exit code 2."""
+    """The console command: `main` on the words of the process; a wrong input ends it with exit code 2.
+
+    A run listens to signals before it imports what takes time.
+    """
+    words = with_command(sys.argv[1:])
+    if words[:1] == ["run"]:
+        interrupts.begin_program()
     try:
-        main(sys.argv[1:])
+        main(words)
     except DistfsiError as error:
         if not isinstance(error, InputError):  # only this rank may have met it: the exception hook ends the others
             raise

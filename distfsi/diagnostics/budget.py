@@ -8,7 +8,7 @@ import numpy as np
 from distfsi.coupling.protocol import Coupling
 from distfsi.diagnostics.watched import Watched
 from distfsi.fluid.fluid import Fluid
-from distfsi.gauges import per_extent
+from distfsi.gauges import extents_of, per_extent
 from distfsi.mesh.blocks import Snapshot
 from distfsi.narrowing import present
 from distfsi.solid.solid import Solid
@@ -28,16 +28,20 @@ class Budget:
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
         self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
-        self._kg, impulse, self._joule = (per_extent(unit, self.dimensions) for unit in ("kg", "N s", "J"))
+        spanned = extents_of(self.dimensions, (fluid.blocks if fluid else present(solid).blocks).grid.coordinates)
+        self._kg, impulse, self._joule = (per_extent(unit, spanned) for unit in ("kg", "N s", "J"))
         self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]
         self.conserved = [*masses, *self._momentum, f"energy [{self._joule}]"]
-        self._names = [name.split(" [")[0] for name in self.conserved]
+        self._names = {n: name.split(" [")[0] for n, name in enumerate(self.conserved)}
+        if fluid and fluid.blocks.grid.coordinates.radial:  # momentum along r is not conserved: all around it is zero
+            del self._names[self.phases]
         self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
+            self.columns += [f"held by {share} [{self._joule}]" for share in fluid.model.carried]
         self.columns += [f"left {name}" for name in self.conserved]
         if fluid and fluid.force:
             self.columns += [f"body force {name}" for name in self.conserved]
@@ -54,7 +58,7 @@ class Budget:
             self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
             self._created = [cause for cause in coupling.causes if cause not in coupling.at_ends]
             self.columns += [f"coupling {cause} {name}" for cause in self._created for name in self.conserved]
-        self.columns += [f"drift {name}" for name in self._names]
+        self.columns += [f"drift {name}" for name in self._names.values()]
 
     def row(self, simulation: Watched) -> dict[str, float | int | str]:
         """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far; of the
@@ -82,6 +86,9 @@ class Budget:
             left = left + self.fluid.left_domain()
             if self.fluid.force:
                 add("body force", self.fluid.force.totals(), -1.0)
+            if self.fluid.model.carried:
+                energies = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
+                values |= {f"held by {share} [{self._joule}]": float(energy) for share, energy in energies}
         if self.solid:
             held = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])
@@ -110,7 +117,7 @@ class Budget:
         size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
         self._scale = np.maximum(self._scale, size)
         drift = (balance - self._start) / np.where(self._scale > 0.0, self._scale, 1.0)
-        return values | {f"drift {name}": d for name, d in zip(self._names, drift, strict=True)}
+        return values | {f"drift {name}": drift[n] for n, name in self._names.items()}
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
@@ -123,7 +130,7 @@ class Budget:
     def summary(self, simulation: Watched) -> str:
         """Collective. One sentence on the conservation error, and on what the coupling has created."""
         row = self.row(simulation)
-        worst = max(abs(float(row[f"drift {name}"])) for name in self._names)
+        worst = max(abs(float(row[f"drift {name}"])) for name in self._names.values())
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
             energy = sum(float(row[f"coupling {cause} {self.conserved[-1]}"]) for cause in self._created)

@@ -13,7 +13,9 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
 from distfsi.laws.law import Law, quantity
+from distfsi.laws.registry import word_of
 
 AXES = "xyz"
 Kept = Mapping[str, np.ndarray]
@@ -29,9 +31,15 @@ def each_hundredth() -> Any:
     return quantity("s", "time between samples; default a hundredth of the run", default=None, above=0.0)
 
 
-def per_extent(unit: str, dimensions: int) -> str:
-    """A unit of what a run of fewer than three dimensions has per metre, or per square metre, of those it has not."""
-    return unit + ("/m2", "/m", "")[dimensions - 1]
+def extents_of(dimensions: int, coordinates: Coordinates) -> int:
+    """How many extents totals count: those of the domain, and those that radial coordinates turn it through."""
+    turned = {"axisymmetric": 1, "cylindrical": 1, "spherical": 2}
+    return dimensions + turned.get(word_of(type(coordinates)), 0)
+
+
+def per_extent(unit: str, extents: int) -> str:
+    """A unit of what has fewer than three extents: per metre, or per square metre, of the others."""
+    return unit + ("/m2", "/m", "")[extents - 1]
 
 
 class Gauge(Law):

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from distfsi.gauges import per_extent
+from distfsi.laws.registry import word_of
 from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
 from distfsi.scene.advice import advice, thickness
-from distfsi.scene.placed_charges import Charge, charges, distances, gap_between
 from distfsi.scene.description import Body, Scene
+from distfsi.scene.placed_charges import Charge, charges, distances, gap_between
 
 
 def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, Any] | None = None) -> str:
@@ -26,6 +27,8 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("domain", f"{size} m, {' x '.join(map(str, domain.cells))} cells of {_metres(domain.spacing)}"),
         _line("blocks", _blocks(resources)),
     ]
+    if domain.coordinates.radial:
+        lines.append(_line("symmetry", f"{word_of(type(domain.coordinates))}; totals of {domain.coordinates.whole}"))
     if scene.fluid:
         names = " and ".join(phase.name for phase in scene.fluid.phases)
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))

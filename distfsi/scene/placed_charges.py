@@ -63,8 +63,8 @@ class Charge:
 
 
 def charges(scene: Scene) -> list[Charge]:
-    """Those that have a size, in the order of the regions."""
-    fluid, domain = scene.fluid, scene.domain
+    """Those that have a size, in the order of the regions; in radial coordinates none is known."""
+    fluid, domain = None if scene.domain.coordinates.radial else scene.fluid, scene.domain
     found = []
     for number, region in enumerate(fluid.regions if fluid else ()):
         phase = present(fluid).phases[region.state.phase]
@@ -74,7 +74,9 @@ def charges(scene: Scene) -> list[Charge]:
         state = region.state
         share = 1.0 if state.volume_fraction is None else state.volume_fraction
         placed, meant = (share * state.density * volume for volume in _volumes(scene, number, region.shape))
-        e = energy(phase.eos, state.density, state.pressure)
+        detonation = present(fluid).detonation
+        burns = detonation is not None and detonation.phase == state.phase
+        e = present(detonation).burn.energy if burns else energy(phase.eos, state.density, state.pressure)
         cells = 0.5 * extent / max(domain.spacing)
         found.append(Charge(number, phase.name, meant, placed, e, _copies(region.shape, domain), cells, region.shape))
     return found
@@ -102,7 +104,8 @@ def _volumes(scene: Scene, number: int, shape: Shape) -> tuple[float, float]:
     sampled = cell_fractions(shape, centers, domain.spacing)
     part = corrected(sampled, Filled.by(sampled), None if exact is None else exact / cell)
     meant = cell * float(part.sum()) if exact is None else exact
-    hiding: list[Shape] = [present(region.shape) for region in present(scene.fluid).regions[number + 1 :]]
+    later = present(scene.fluid).regions[number + 1 :]
+    hiding: list[Shape] = [shape for region in later if (shape := region.shape) is not None]
     hiding += [body.shape for body in scene.solid.bodies] if scene.solid else []
     for other in hiding:
         part = part * (1.0 - cell_fractions(other, centers, domain.spacing))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from distfsi.gauges import per_extent
-from distfsi.scene.placed_charges import ENOUGH, Charge, charges, gap_between, losses
 from distfsi.scene.description import Body, Domain, Scene
+from distfsi.scene.placed_charges import ENOUGH, Charge, charges, gap_between, losses
 from distfsi.scene.plausible import far_outside
 
 MISPLACED = 0.01  # part of a charge that may be missing in its cells
