@@ -104,12 +104,12 @@ def run(
     requests = Requests(directory / output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
     files = storage(output.hdf5, communicator)
     _refuse([*cache_faults(), *filter(None, [shortage(scene, communicator)])], communicator)
-    if communicator.rank == 0:
-        for text in warnings(scene):
-            print(f"warning: {text}", flush=True)
     progress = Progress(scene.time.end, communicator)
     for note in scene.notes:
         progress.say(note)
+    if communicator.rank == 0:
+        for text in warnings(scene):
+            progress.say(f"warning: {text}")
     threads = threads or threads_of_rank(communicator)
     device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None

@@ -65,24 +65,23 @@ def parser() -> argparse.ArgumentParser:
 
 def main(words: Sequence[str]) -> None:
     """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
+    if near := _mistyped(words[0] if words else ""):
+        parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
     arguments = parser().parse_args(with_command(words))
     arguments.execute(arguments)
 
 
-def with_command(words: Sequence[str]) -> list[str]:
-    """The words, `run` before them where they begin with no command."""
-    if not words or words[0] in COMMANDS or words[0].startswith("-"):
-        return list(words)
-    if near := _mistyped(words[0]):
-        parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
-    return ["run", *words]
-
-
 def _mistyped(word: str) -> str | None:
-    """The command that a word is meant to be, if it is no input file but resembles one."""
-    if "." in word or os.sep in word or os.path.exists(word):
+    """The command that a word is meant to be, if it is none, and no input file, but resembles one."""
+    if word in COMMANDS or word.startswith("-") or "." in word or os.sep in word or os.path.exists(word):
         return None
     return next(iter(difflib.get_close_matches(word.lower(), COMMANDS, n=1)), None)
+
+
+def with_command(words: Sequence[str]) -> list[str]:
+    """The words, `run` before them where they begin with no command."""
+    is_scene = words and words[0] not in COMMANDS and not words[0].startswith("-")
+    return ["run", *words] if is_scene else list(words)
 
 
 def command() -> None:

@@ -21,7 +21,7 @@ class Coordinates(Law):
     radial      whether the first axis is a distance r >= 0
     axes        names of the axes
     whole       what totals count
-    counted     in how many dimensions they do, per metre in those that are missing; None: in those of the domain
+    turns       of how many dimensions besides those of the domain: about an axis, about a point
     """
 
     folder = "coordinates"
@@ -29,7 +29,7 @@ class Coordinates(Law):
     radial: ClassVar[bool] = True
     axes: ClassVar[str] = "r"
     whole: ClassVar[str]
-    counted: ClassVar[int | None] = 3
+    turns: ClassVar[int] = 1
 
     def area(self, r: Any) -> Any:
         """Area of a face normal to the first axis at r [m], per length along the second axis."""

@@ -14,4 +14,3 @@ class Axisymmetric(Cylindrical):
     dimensions = (2,)
     axes = "rz"
     whole = "all around the axis"
-    counted = 3

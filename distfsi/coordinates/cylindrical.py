@@ -15,7 +15,6 @@ class Cylindrical(Coordinates):
 
     dimensions = (1,)
     whole = "all around the axis, per metre along it"
-    counted = 2
 
     def area(self, r: Any) -> Any:
         return 2.0 * pi * r

@@ -15,8 +15,8 @@ class Planar(Coordinates):
     dimensions = (1, 2, 3)
     radial = False
     axes = "xyz"
+    turns = 0
     whole = "the domain; in fewer than three dimensions per metre along those that are left out"
-    counted = None
 
     def area(self, r: Any) -> Any:
         return 1.0 + 0.0 * r

@@ -26,16 +26,16 @@ class Budget:
 
     def __init__(self, fluid: Fluid | None, solid: Solid | None, coupling: Coupling | None):
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
-        grid = (fluid.blocks if fluid else present(solid).blocks).grid
-        self.dimensions = grid.dimensions
+        self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
-        counted = grid.coordinates.counted or grid.dimensions
-        self._kg, impulse, self._joule = (per_extent(unit, counted) for unit in ("kg", "N s", "J"))
+        grid = (fluid.blocks if fluid else present(solid).blocks).grid
+        spanned = grid.dimensions + grid.coordinates.turns
+        self._kg, impulse, self._joule = (per_extent(unit, spanned) for unit in ("kg", "N s", "J"))
         self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]
         self.conserved = [*masses, *self._momentum, f"energy [{self._joule}]"]
         self._names = {n: name.split(" [")[0] for n, name in enumerate(self.conserved)}
-        if grid.coordinates.radial:  # momentum along r is not conserved: all around it is zero
+        if fluid and fluid.blocks.grid.coordinates.radial:  # momentum along r is not conserved: all around it is zero
             del self._names[self.phases]
         self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
@@ -85,11 +85,11 @@ class Budget:
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.force:
+                add("body force", self.fluid.force.totals(), -1.0)
             if self.fluid.model.carried:
                 energies = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
                 values |= {f"held by {share} [{self._joule}]": float(energy) for share, energy in energies}
-            if self.fluid.force:
-                add("body force", self.fluid.force.totals(), -1.0)
         if self.solid:
             held = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])

@@ -115,7 +115,7 @@ class LayerAndTable(LayerFiles):
         self._table = TableFile(path, present(probe.table), communicator)
 
     def faults(self, until: float) -> list[str]:
-        return [*super().faults(until), *self._table.faults(until)]
+        return super().faults(until) + self._table.faults(until)
 
     def open(self, until: float) -> None:
         super().open(until)

@@ -70,7 +70,7 @@ class Fluid:
         self._grid = blocks.grid_on(device)
         self._fastest = DualArray(device, np.zeros(blocks.local_count))
         forced = bool(model.constants["HYDROSTATIC"])
-        self.force = GivenByForce(blocks, device, model, real) if forced else None
+        self.force = GivenByForce(blocks, device, model, self.metrics, real) if forced else None
         self._weighed = WeighedGhosts(blocks, self.exchange, device, model, real) if forced else None
         self._before = [pair.host().copy() for pair in self._accounts]
         self._signal: float | None = None
@@ -171,9 +171,7 @@ class Fluid:
     def account_force(self, stage: Stage, dt: float) -> None:
         """Account for what the body force gives in a stage of a step of `dt` [s]; before the stage."""
         if self.force:
-            self.force.account(
-                self.input_of(stage), self._volumes.read, self.tiling.metrics, self._grid, stage.weight * dt
-            )
+            self.force.account(self.input_of(stage), self._volumes.read, self._grid, stage.weight * dt)
 
     def begin_stage(self) -> None:
         """Find out which tiles are at rest."""
@@ -315,10 +313,7 @@ class Fluid:
     def held_energies(self) -> np.ndarray:
         """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
         first = self.model.fraction + 1
-        shares = [
-            self.metrics.weighted(self.cells(b)[first:].astype(np.float64), b).sum(axis=(1, 2, 3))
-            for b in range(self.blocks.local_count)
-        ]
+        shares = [self.cells(b)[first:].astype(np.float64).sum(axis=(1, 2, 3)) for b in range(self.blocks.local_count)]
         sums = np.reshape(shares, (self.blocks.local_count, len(self.model.carried)))
         return self.blocks.sum(sums * self._cell_volume()) * self.model.constants["HELD_ENERGY"]
 

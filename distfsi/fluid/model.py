@@ -129,9 +129,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
         "ASYMMETRIC": asymmetric or radial,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
+        "HYDROSTATIC": any(body_force.acceleration),
         "RADIAL": radial,
         "SHARES": 2 * dimensions + radial,
-        "HYDROSTATIC": any(body_force.acceleration),
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")

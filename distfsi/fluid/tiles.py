@@ -21,7 +21,6 @@ class Tiling:
     first    (tiles, 3) first cell of each tile in the grid
     box      cells of a whole tile with its ghosts
     through  (tiles, 6, conserved) what has left through the domain's sides so far, per area of a face
-    metrics  of each column of cells, on the device (fluid/metrics.py)
     limited  (tiles,) faces at the low sides of its cells whose flux was limited so far
     """
 
@@ -44,7 +43,7 @@ class Tiling:
         self.first = np.array(first, dtype=np.int64).reshape(-1, 3)
         self.through = DualArray(device, np.zeros((len(self.table), 6, conserved)))
         self.limited = DualArray(device, np.zeros(len(self.table), dtype=np.int64))
-        self._on_device, self.metrics = device.array(self.table), device.array(metrics.table)
+        self._on_device, self._metrics = device.array(self.table), device.array(metrics.table)
         self._spacing = device.array(blocks.spacing)
 
     @property
@@ -65,7 +64,7 @@ class Tiling:
     def arguments(self, calm: Any, stages: Any) -> records.Tiles:
         """What a stage is given: the tiles, which of them are calm and for how many stages each has been at rest."""
         counted = self.through.device, self.limited.device
-        return records.Tiles(self._on_device, calm, stages, *counted, self.metrics, self._spacing)
+        return records.Tiles(self._on_device, calm, stages, *counted, self._metrics, self._spacing)
 
 
 def domain_sides(blocks: Blocks, first: np.ndarray, cells: np.ndarray) -> int:

@@ -29,9 +29,9 @@ def each_hundredth() -> Any:
     return quantity("s", "time between samples; default a hundredth of the run", default=None, above=0.0)
 
 
-def per_extent(unit: str, dimensions: int) -> str:
-    """A unit of what a run of fewer than three dimensions has per metre, or per square metre, of those it has not."""
-    return unit + ("/m2", "/m", "")[dimensions - 1]
+def per_extent(unit: str, extents: int) -> str:
+    """A unit of what has fewer than three extents: per metre, or per square metre, of the others."""
+    return unit + ("/m2", "/m", "")[extents - 1]
 
 
 class Gauge(Law):

@@ -81,13 +81,9 @@ def _body(body: Body, particles: int, scene: Scene) -> str:
     return text + (f", {thick / min(scene.domain.spacing):.3g} cells" if scene.fluid else "")
 
 
-def _counted(scene: Scene) -> int:
-    """In how many dimensions masses count."""
-    return scene.domain.coordinates.counted or scene.domain.dimensions
-
-
 def _charge(charge: Charge, scene: Scene) -> str:
-    kg = per_extent("kg", _counted(scene))
+    dimensions = scene.domain.dimensions
+    kg = per_extent("kg", dimensions)
     text = f"{charge.name}: {charge.meant:.4g} {kg}, {charge.placed:.4g} {kg} as placed"
     text += f" (one of {charge.copies} parts)" if charge.copies > 1 else ""
     text += f", {charge.cells:.3g} cells per radius; the energy of {charge.tnt:.4g} {kg} of TNT"
@@ -101,7 +97,7 @@ def _touches(charge: Charge, body: Body, scene: Scene) -> bool:
 
 def _distances(charge: Charge, scene: Scene) -> Iterator[str]:
     for name, length in distances(scene, charge):
-        scaled = f", Z = {charge.scaled(length):.3g} m/kg^(1/3)" if _counted(scene) == 3 else ""
+        scaled = f", Z = {charge.scaled(length):.3g} m/kg^(1/3)" if scene.domain.dimensions == 3 else ""
         yield f"{name}: {length:.4g} m from the center of charge '{charge.name}'{scaled}"
 
 

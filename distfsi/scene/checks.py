@@ -48,7 +48,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
 LONGEST_NAME = 255  # bytes of a file's name
-LONGEST_PATH, LONGEST_FOLDER = 2000, 255  # bytes of the output directory's name, and of one part of it
+LONGEST_PATH = 2000  # of the output directory's
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -331,7 +331,7 @@ def check_output(given: OutputInput, present: Container[str], domain: Domain) ->
 
 def check_directory(given: str) -> Iterator[Fault]:
     """Its name is one that file systems take."""
-    if len(given.encode()) > LONGEST_PATH or any(len(part.encode()) > LONGEST_FOLDER for part in given.split("/")):
+    if len(given.encode()) > LONGEST_PATH or any(len(part.encode()) > LONGEST_NAME for part in given.split("/")):
         yield Fault(("output", "directory"), f"'{given[:40]}...' is too long for the name of a directory")
 
 

@@ -28,7 +28,8 @@ def far_outside(fluid: Fluid | None, bodies: tuple[Body, ...]) -> Iterator[str]:
         if isinstance(phase.eos, Jwl):
             yield from _beyond(where, "density", state.density, EXPLOSIVES, "explosives", "kg/m3")
             e = energy(phase.eos, state.density, state.pressure)
-            if region.shape is not None and not DETONATIONS[0] / FAR <= e <= 2.0 * DETONATIONS[1]:
+            burns = present(fluid).detonation is not None
+            if region.shape is not None and not burns and not DETONATIONS[0] / FAR <= e <= 2.0 * DETONATIONS[1]:
                 yield f"{where}: an energy of {e:.3g} J/kg; explosives have 3e6 to 1.2e7 J/kg (not J/m3)"
         if isinstance(phase.eos, StiffenedGas) and phase.eos.p_inf > LIQUID_STIFFNESS:
             yield from _beyond(where, "density", state.density, LIQUIDS, "liquids", "kg/m3")

@@ -10,8 +10,10 @@ from distfsi.mesh.kernels.grid import BlockGrid, block_size, cell_at, cell_volum
 @driver
 def account_force(begin, end, U, volumes, metrics, given, rows, time, grid: BlockGrid):
     """given[r] (D + 1,) grows by the momentum [N s] and the work [J] that the body force gives in `time` [s] to the
-    cells of row r in the states U, by their `volumes` and their columns' `metrics`; `rows`: of a block, along y; all
-    rows of a block follow each other."""
+    cells of row r in the states U; `rows`: of a block, along y; all rows of a block follow each other.
+
+    metrics  (blocks, METRICS, X), if coordinates are RADIAL
+    """
     cells = block_size(grid)
     planes = len(given) // (len(grid.extent) * rows)
     for r in range(begin, end):
@@ -23,7 +25,7 @@ def account_force(begin, end, U, volumes, metrics, given, rows, time, grid: Bloc
             for i in range(grid.extent[block, 0]):
                 part = load(volumes, volume + i) if FRACTIONAL else 1.0
                 if RADIAL:
-                    part = part * metrics[block, VOLUME, GHOSTS + i]
+                    part = metrics[block, VOLUME, GHOSTS + i]
                 if part > 0.0:
                     mass += part * sum(load(U, row + v * cells + i) for v in static_range(PHASES))
                     power += part * sum(

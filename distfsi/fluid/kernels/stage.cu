@@ -111,29 +111,30 @@ DEVICE void find_falls(const auto &numbers, real dt, real x, real y, real z, rea
 }
 
 // Increments of a variable from the low face of a cell to its mean and from there to its high face; `fall`: of find_falls.
-template <int AXIS> DEVICE auto increments(const auto &numbers, const real *P, int variable, Metrics metrics, real fall, int i, int j, int k)
+template <int AXIS> DEVICE auto increments(const auto &numbers, const real *P, Metrics metrics, int variable, real fall, int i, int j, int k)
 {
     const bool sharp = variable == PHASES + DIMENSIONS + 1;
     real values[2 * GHOSTS - 1];
 #pragma unroll
     for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = P[variable * SP + cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
     const auto cells = tuple_of<2 * GHOSTS - 1>(values);
-    if constexpr (HYDROSTATIC) {
-        if (variable == PHASES + DIMENSIONS) {
-            real densities[2 * GHOSTS - 1], found[2];
-#pragma unroll
-            for (int n = 0; n < 2 * GHOSTS - 1; n++) densities[n] = density_at(P, cell_along<AXIS>(i, j, k, n + 1 - GHOSTS));
-            set(reconstructed(numbers, beyond_rest(numbers, cells, tuple_of<2 * GHOSTS - 1>(densities), fall)), found, 1);
-            const real weight = HALF * fall * densities[GHOSTS - 1];
-            found[0] += weight, found[1] += weight;
-            return tuple_of<2>(found);
-        }
-    }
     if constexpr (RADIAL && AXIS == 0) {
         const auto along = reconstructed_in_r(numbers, cells, metrics(NEARNESS, i), metrics(NEARNESS, i + 1), metrics(TO_LOW, i));
         return SHARPENED && sharp ? sharpened(numbers, cells) : along;
-    } else
+    } else {
+        if constexpr (HYDROSTATIC) {
+            if (variable == PHASES + DIMENSIONS) {
+                real densities[2 * GHOSTS - 1], found[2];
+#pragma unroll
+                for (int n = 0; n < 2 * GHOSTS - 1; n++) densities[n] = density_at(P, cell_along<AXIS>(i, j, k, n + 1 - GHOSTS));
+                set(reconstructed(numbers, beyond_rest(numbers, cells, tuple_of<2 * GHOSTS - 1>(densities), fall)), found, 1);
+                const real weight = HALF * fall * densities[GHOSTS - 1];
+                found[0] += weight, found[1] += weight;
+                return tuple_of<2>(found);
+            }
+        }
         return SHARPENED && sharp ? sharpened(numbers, cells) : reconstructed(numbers, cells);
+    }
 }
 
 // Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
@@ -149,8 +150,8 @@ DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int
         const int u = variable_at(v, AXIS);
         const real *W = P + u * SP;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + item<1>(increments<AXIS>(numbers, P, u, metrics, fall[AXIS], i, j, k));
-        right[v] = W[high] - item<0>(increments<AXIS>(numbers, P, u, metrics, fall[AXIS], i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+        left[v] = W[low] + item<1>(increments<AXIS>(numbers, P, metrics, u, fall[AXIS], i, j, k));
+        right[v] = W[high] - item<0>(increments<AXIS>(numbers, P, metrics, u, fall[AXIS], i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
     if constexpr (TRANSVERSE_SENSOR) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
