@@ -206,3 +206,17 @@ def test_what_does_not_fit_is_refused(finished, tmp_path):
     single = load(tmp_path / "target.toml", ["fluid.precision=float32"])
     with pytest.raises(InputError, match=r"fluid.precision: only float64 can be mapped"):
         Simulation.of(single, Communicator(), 1)
+
+
+def test_ranks_map_the_same_bits(finished, tmp_path, mpiexec):
+    """On two ranks, and the run says what it has mapped."""
+    target(tmp_path, finished["spherical"], "planar", TARGETS["spherical", "planar"])
+    sizes = ("--set", "performance.block_cells=[7, 8, 6]", "--set", "performance.tile_cells=[7, 4, 3]")
+    found = []
+    for ranks in (1, 2):
+        words = ("--threads", 1, *sizes, "--set", f"output.directory={tmp_path / str(ranks)}")
+        printed = mpiexec(ranks, "-m", "distfsi", "run", tmp_path / "target.toml", *words)
+        assert printed.count("mapped from") == 1 and "radial momentum [N s]" in printed
+        found.append(read_cells(series(tmp_path / str(ranks), "cells")[-1][1])[1])
+    for name, values in found[0].items():
+        np.testing.assert_array_equal(found[1][name], values)
