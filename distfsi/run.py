@@ -68,7 +68,9 @@ def _refuse(faults: list[str], communicator: Communicator) -> None:
 
 def compile_kernels(scene: Scene, communicator: Communicator) -> int:
     """Compile what the first steps of a scene need; how many kernels were not yet on disk. Nothing is written."""
-    simulation = Simulation.of(scene, communicator)
+    for stage in scene.stages:
+        compile_kernels(stage, communicator)
+    simulation = Simulation.of(scene, communicator, resumed=True)  # from what need not be there yet
     budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
     simulation.watch()
     for _ in range(STEPS_TO_COMPILE):
@@ -93,6 +95,8 @@ def run(
     Raises on all ranks: InputError for a restart file of another scene, OutputError, Diverged, and Stopped when a
     signal, the stop file or the wall-clock limit has ended the run early.
     """
+    for stage in scene.stages:
+        run(stage, communicator, threads, "auto" if restart else None, on_gpu, direct)
     started = clock.perf_counter()
     directory, output = Path(scene.output.directory), scene.output
     requests = Requests(Path(output.stop_file), scene.time.wall_clock_limit, output.restart_every, communicator)

@@ -8,6 +8,7 @@ from distfsi.errors import InputError
 from distfsi.fluid.mapping import shell_parts
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, series
+from distfsi.output.history import read_history
 from distfsi.run import run
 from distfsi.scene import load, overlaps
 from distfsi.simulation import Simulation
@@ -220,3 +221,69 @@ def test_ranks_map_the_same_bits(finished, tmp_path, mpiexec):
         found.append(read_cells(series(tmp_path / str(ranks), "cells")[-1][1])[1])
     for name, values in found[0].items():
         np.testing.assert_array_equal(found[1][name], values)
+
+
+# ---- stages ----------------------------------------------------------------------------------------------------------
+
+STAGES = (
+    """
+title = "a sphere, its wave around an axis, and in an octant"
+[domain]
+lower = [0, 0, 0]
+upper = [0.4, 0.4, 0.4]
+cells = [12, 12, 12]
+x = ["symmetry", "outflow"]
+y = ["symmetry", "outflow"]
+z = ["symmetry", "outflow"]
+[time]
+end = 2.2e-5
+"""
+    + PHASES.replace("[[fluid", "[fluid.map]\ncenter = [0, 0, 0]\n[[fluid")
+    + """
+[[stages]]
+domain = { symmetry = "spherical", lower = 0, upper = 0.3, cells = 60, x = ["axis", "outflow"] }
+time = { end = 1e-5 }
+regions = [
+  { phase = "gas", density = 1.2, pressure = 1e5 },
+  { phase = "charge", density = 1630, pressure = 8e9, shape = { kind = "ball", center = 0, radius = 0.05 } },
+]
+[[stages]]
+time = { end = 1.6e-5 }
+regions = [{ phase = "gas", density = 1.2, pressure = 1e5 }]
+[stages.domain]
+symmetry = "axisymmetric"
+lower = [0, 0]
+upper = [0.35, 0.35]
+cells = [21, 21]
+x = ["axis", "outflow"]
+y = ["symmetry", "outflow"]
+"""
+)
+
+
+def test_stages_lead_from_one_dimension_to_three(tmp_path, capsys):
+    """One input: a sphere, (r, z), an octant; totals at both links to 1e-12."""
+    path = tmp_path / "scene.toml"
+    path.write_text(STAGES)
+    scene = load(path, [f"output.directory={tmp_path / 'out'}"])
+    assert [stage.domain.dimensions for stage in scene.stages] == [1, 2]
+    octant = run(scene, Communicator(), 1)
+    printed = capsys.readouterr().out
+    assert printed.count("mapped from") == 2
+    np.testing.assert_allclose(octant.fluid.mapping.after, octant.fluid.mapping.before, rtol=1e-12)
+    # a quarter of the half that lies in (r, z)
+    _, half, *_ = (read_history(tmp_path / f"out-stage-{n}" / "history.csv") for n in (1, 2))
+    assert octant.time == pytest.approx(2.2e-5)
+    assert octant.fluid.mapping.before[1] == pytest.approx(half["fluid mass_2 [kg]"][-1] / 4.0, rel=1e-3)
+
+
+def test_faults_of_a_stage_are_told_with_their_keys(tmp_path):
+    """Those of the scene beside them."""
+    path = tmp_path / "scene.toml"
+    path.write_text(STAGES)
+    words = ["stages.0.domain.cells=0", "stages.1.domain.symmetry=spherical", "stages.1.time.end=-1", "time.cfl=2"]
+    with pytest.raises(InputError) as found:
+        load(path, words)
+    told = "\n".join(found.value.faults)
+    for key in ("stages.0.domain.cells", "stages.1.domain.symmetry", "stages.1.time.end", "time.cfl"):
+        assert key in told, told
