@@ -17,7 +17,7 @@ LAYERS = (
     {"study"},
     {"resources"},
     {"run"},
-    {"simulation", "direct"},
+    {"simulation", "direct", "memory"},
     {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
@@ -25,7 +25,7 @@ LAYERS = (
     {"gauges", "coordinates"},
     {"laws"},
     {"formulas"},
-    {"air_blast", "errors", "narrowing", "__init__"},
+    {"air_blast", "errors", "interrupts", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}

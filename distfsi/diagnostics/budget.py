@@ -37,6 +37,7 @@ class Budget:
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
+            self.columns += [f"held by {share} [J]" for share in fluid.model.carried]
         self.columns += [f"left {name}" for name in self.conserved]
         if solid:
             self.columns += [
@@ -74,6 +75,9 @@ class Budget:
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.model.carried:
+                energies = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
+                values |= {f"held by {share} [J]": float(energy) for share, energy in energies}
         if self.solid:
             held = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])

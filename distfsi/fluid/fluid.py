@@ -16,6 +16,7 @@ from distfsi.fluid.kernels.stage import advance_tiles
 from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.metrics import Metrics
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.reactions import Reactions
 from distfsi.fluid.rest import Rest
 from distfsi.fluid.stages import SCHEMES, Stage
 from distfsi.fluid.tiles import Tiling
@@ -69,6 +70,7 @@ class Fluid:
         self._signal: float | None = None
         self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
+        self.reactions = Reactions(given, model, blocks, device, real) if model.carried else None
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
@@ -282,6 +284,13 @@ class Fluid:
             cells = self.metrics.weighted(cells, block)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
         return sums * self._cell_volume()
+
+    def held_energies(self) -> np.ndarray:
+        """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
+        first = self.model.fraction + 1
+        shares = [self.cells(b)[first:].astype(np.float64).sum(axis=(1, 2, 3)) for b in range(self.blocks.local_count)]
+        sums = np.reshape(shares, (self.blocks.local_count, len(self.model.carried)))
+        return self.blocks.sum(sums * self._cell_volume()) * self.model.constants["HELD_ENERGY"]
 
     def leave(self, volume: np.ndarray) -> None:
         """All that the cells hold in this `volume` (local blocks, Z, Y, X) counts as having left the domain."""

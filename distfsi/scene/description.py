@@ -15,7 +15,9 @@ import numpy as np
 from distfsi.coordinates import Coordinates
 from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn as AfterburnLaw
+from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -139,6 +141,52 @@ class Region:
 
 
 @dataclass(frozen=True)
+class PointDetonator:
+    """Lights the explosive from `position` [m] after `delay` [s]."""
+
+    position: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineDetonator:
+    """Lights it from all points of the line from `start` to `end` [m] at once, after `delay` [s]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlaneDetonator:
+    """Lights it from all of the plane through `point` [m] at once, after `delay` [s]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    delay: float = 0.0
+
+
+Detonator = PointDetonator | LineDetonator | PlaneDetonator
+
+
+@dataclass(frozen=True)
+class Detonation:
+    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+
+    phase: int
+    burn: Burn
+    detonators: tuple[Detonator, ...]
+
+
+@dataclass(frozen=True)
+class Afterburn:
+    """How the products, a phase, burn with air."""
+
+    phase: int
+    law: AfterburnLaw
+
+
+@dataclass(frozen=True)
 class Map:
     """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
     radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
@@ -161,6 +209,8 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    detonation: Detonation | None = None
+    afterburn: Afterburn | None = None
     map: Map | None = None
 
 
@@ -191,14 +241,18 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
+    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
+
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
+    `friction`: Coulomb's coefficient between bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -209,6 +263,8 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    obstacles: bool = False
+    friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
@@ -242,7 +298,7 @@ class Time:
     """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
-    `wall_clock_limit` [s] of computing.
+    `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
     """
 
     end: float
@@ -250,6 +306,7 @@ class Time:
     maximum_steps: int | None
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
+    smallest_step: float = 1e-3
 
 
 @dataclass(frozen=True)
@@ -266,8 +323,8 @@ class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
     `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
-    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
-    is by a file called `stop_file`.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only at the end (`restart_at_end`)
+    and when the run is stopped, as it is by a file called `stop_file` in the directory.
     """
 
     directory: str
@@ -278,6 +335,7 @@ class Output:
     hdf5: Hdf5 = "mpi-io"
     restart_every: float = 0.0
     stop_file: str = "stop"
+    restart_at_end: bool = True
 
 
 @dataclass(frozen=True)

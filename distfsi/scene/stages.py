@@ -12,7 +12,7 @@ from typing import Any
 
 from distfsi.scene.faults import Path
 
-OF_SPACE = ("regions", "inflow", "map")  # what the fluid of another domain says anew
+OF_SPACE = ("regions", "inflow", "map", "detonation")  # what the fluid of another domain says anew
 OUTPUT = ("history_every", "hdf5", "restart_every")  # what a stage takes over of where results go
 
 
@@ -39,6 +39,8 @@ def _input(
     fluid = {key: value for key, value in data["fluid"].items() if key not in OF_SPACE}
     if "regions" in stage:
         fluid["regions"] = stage["regions"]
+    if isinstance(data["fluid"].get("detonation"), dict):
+        fluid["detonation"] = data["fluid"]["detonation"] | {"detonators": stage.get("detonators", ())}
     if before is not None:
         fluid["map"] = {"run": before} | stage.get("map", {})
     output = {key: value for key, value in data.get("output", {}).items() if key in OUTPUT}
@@ -55,6 +57,8 @@ def _input(
 def path_in_stage(number: int, path: Path) -> Path:
     """Where a key of a stage's whole input stands in the scene's."""
     match path:
+        case ("fluid", "detonation", "detonators", *rest):
+            return ("stages", number, "detonators", *rest)
         case ("fluid", ("regions" | "map") as key, *rest):
             return ("stages", number, key, *rest)
         case (("domain" | "time" | "gauges") as key, *rest):

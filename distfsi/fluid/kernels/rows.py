@@ -82,7 +82,7 @@ def increments_row(P, T, p, sp, step, t, st, n):
         for i in range(n):
             c = p + v * sp + i
             cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
-            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else reconstructed(cells)
+            low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
             store(T, t + v * st + i, high)
             if ASYMMETRIC and not RADIAL:
                 store(T, t + low_increment(v, 0) * st + i, low)
@@ -309,7 +309,7 @@ def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step
         for _ in range(HALVINGS):
             low, high = halved_range(phases, low, high)
         fraction = fraction_after(before, moved + 0.5 * (low + high))
-        store(states.after, cells.state + (VARIABLES - 1) * cells.state_variables + i, fraction)
+        store(states.after, cells.state + (PHASES + DIMENSIONS + 1) * cells.state_variables + i, fraction)
         i = next_negative(T, 0, i + 1, n)
 
 

@@ -122,7 +122,7 @@ DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
         const real *W = P + variable_at(v, AXIS) * SP;
-        const bool sharp = v == VARIABLES - 1;
+        const bool sharp = v == PHASES + DIMENSIONS + 1;
         low_mean[v] = W[low], high_mean[v] = W[high];
         left[v] = W[low] + item<1>(increments<AXIS>(numbers, W, metrics, sharp, i, j, k));
         right[v] = W[high] - item<0>(increments<AXIS>(numbers, W, metrics, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
@@ -207,7 +207,7 @@ template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> befor
         auto range = range_of_change(numbers, item<0>(start));
 #pragma unroll 1
         for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
-        U_new[(VARIABLES - 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+        U_new[(PHASES + DIMENSIONS + 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
     }
 }
 
