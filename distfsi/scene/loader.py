@@ -34,12 +34,14 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
-    unnamed, incomplete = materials.fill(data)
     inputs = stage_inputs(data, file.stem)
+    unnamed, incomplete = materials.fill(data)
     scene, found = _checked(data, file)
     stages: list[Scene] = []
     for number, given in enumerate(inputs):
+        _, unknown = materials.fill(given)  # whose faults are those of the scene
         stage, more = _checked(given, file)
+        more = [fault for fault in more if not _inside(fault.path, unknown)]
         found += [Fault(path_in_stage(number, fault.path), fault.text) for fault in more]
         stages += [stage] if stage else []
     if scene is not None and not inputs:  # they will have run
