@@ -366,7 +366,7 @@ class Performance:
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
 
     title: str
     domain: Domain
@@ -379,3 +379,4 @@ class Scene:
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    stages: tuple[Scene, ...] = ()
