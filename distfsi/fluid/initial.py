@@ -10,6 +10,7 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
 from distfsi.narrowing import present
@@ -24,7 +25,8 @@ ALIKE = 1e-9  # part by which pressures differ that are one
 def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
     """Collective. How much of each active cell (z, y, x) of the local blocks lies in `shape`, None where nothing does.
 
-    All together they hold the exact volume of what lies in the domain, where that is known.
+    All together they hold the exact volume of what lies in the domain, where that is known; not yet around an axis, but
+    for a sphere on it.
     """
     grid, axes = blocks.grid, blocks.grid.dimensions
     lower, upper = bounding_box(shape)
@@ -33,7 +35,10 @@ def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
         centers, spacing = blocks.cell_centers(block)[:axes], grid.spacing[:axes]
         ends = zip(centers, spacing, lower, upper, strict=True)
         near = all(x[-1] + 0.5 * h >= low and x[0] - 0.5 * h <= high for x, h, low, high in ends)
-        parts.append(cell_fractions(shape, centers, spacing).reshape(blocks.extent[block][::-1]) if near else None)
+        found = cell_fractions(shape, centers, spacing, grid.coordinates) if near else None
+        parts.append(None if found is None else found.reshape(blocks.extent[block][::-1]))
+    if grid.coordinates.radial:
+        return parts
     filled = Filled.together(Filled.by(part) for part in parts if part is not None)
     filled = Filled.together(blocks.communicator.allgather(filled))
     volume = volume_within(shape, grid.lower[:axes], grid.upper[:axes])
@@ -69,12 +74,12 @@ class InitialState:
         shares = [1.0 if state.phase == self.model.constants["CARRIER"] else 0.0] * len(self.model.carried)
         return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction, *shares)), dtype=float)
 
-    def paint(self, blocks: Blocks, field: np.ndarray) -> None:
+    def paint(self, blocks: Blocks, field: np.ndarray, mapping: Mapping | None = None) -> None:
         """Collective. Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers
         in part holds that part of the region's mass, momentum and energy; two materials have come to one pressure in
-        it."""
+        it. What is mapped comes over the first region."""
         ghosts = blocks.grid.ghosts[::-1]
-        for region in self.fluid.regions:
+        for number, region in enumerate(self.fluid.regions):
             state = self.of(region.state)
             parts = (
                 [np.ones((1, 1, 1))] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
@@ -84,6 +89,10 @@ class InitialState:
                 where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
                     self._lay_over(field[where], state, part)
+                if mapping and number == 0:
+                    mapping.apply(block, field[where])
+        if mapping:
+            mapping.sum_up()
 
     def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
         """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""

@@ -100,7 +100,7 @@ def fluid_model(scene: Scene) -> FluidModel:
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     asymmetric = reconstructed is reconstruction.weno5
-    body_force = BodyForce(scene.sources, dimensions)
+    body_force, radial = BodyForce(scene.sources, dimensions), scene.domain.coordinates.radial
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
@@ -118,8 +118,10 @@ def fluid_model(scene: Scene) -> FluidModel:
         "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
-        "ASYMMETRIC": asymmetric,
+        "ASYMMETRIC": asymmetric or radial,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
+        "RADIAL": radial,
+        "SHARES": 2 * dimensions + radial,
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
@@ -131,6 +133,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     positive = ("limiter_indicator", "is_admissible", "limited_flux")
     bindings |= {name: Bound(getattr(positivity, name)) for name in positive}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
+    if radial:
+        bindings["reconstructed_in_r"] = Bound(reconstruction.muscl_in_r)
     bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True

@@ -52,6 +52,8 @@ CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
 BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed number of fits: then bisection")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
+RADIAL = Symbol("whether the first axis is the distance from a point or an axis (coordinates/)")
+SHARES = Symbol("parts of a cell's change that the limiter looks at: its faces, and in r what their areas differ by")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
 ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
 TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
@@ -68,6 +70,9 @@ limited_slope = chosen("limited_slope", "(backward difference, forward differenc
 reconstructed = chosen(
     "reconstructed",
     "cells around and with one -> increments from its low face to its mean, from there to its high face",
+)
+reconstructed_in_r = chosen(
+    "reconstructed_in_r", "as reconstructed along r, with the nearness to both sides, and the way from the low face"
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
 primitives = chosen("primitives", "conserved state -> primitive state")
@@ -99,6 +104,7 @@ VISCOSITY_ALPHA = Symbol("artificial viscosity, linear part")
 VISCOSITY_BETA = Symbol("artificial viscosity, quadratic part")
 SMOOTHING_RATIO = Symbol("smoothing length over particle spacing")
 ARTIFICIAL_STRESS = Symbol("share of the tension with which close particles push each other away; 0: none")
+FRICTION = Symbol("Coulomb's coefficient between bodies; 0: none")
 ZERO_ENERGY = Symbol("stiffness against what the deformation gradient does not see, in shear moduli")
 POLAR_ROTATION = Symbol("whether stresses turn with the rotation of the polar decomposition; else with the vorticity")
 FAILS = Symbol("whether the material, outside the material's kernels any material, can fail")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -30,7 +31,7 @@ class Section:
 
     axes     names of the horizontal and, but in one dimension, the vertical one
     extent   left, right, bottom, top [m]
-    place    where the plane lies, in words
+    label    where the plane lies, in words
     region   (rows, columns) number of the region at each point; None without a fluid
     bodies   by name the signed distance [m] (rows, columns) to its surface
     particles  by name those in the plane (n, 2) [m]
@@ -39,7 +40,7 @@ class Section:
 
     axes: tuple[str, ...]
     extent: tuple[float, float, float, float]
-    place: str
+    label: str
     region: np.ndarray | None
     bodies: Mapping[str, np.ndarray]
     particles: Mapping[str, np.ndarray]
@@ -75,11 +76,11 @@ def _color(colors: Sequence[str], number: int) -> str:
 def _draw(axes: Axes, section: Section, regions: int) -> None:
     left, right, bottom, top = section.extent
     length, metres = scaled("m", max(right - left, top - bottom))
-    extent = [edge / length for edge in section.extent]
+    extent = (left / length, right / length, bottom / length, top / length)
     if section.region is not None:
         colors = ListedColormap([_color(REGION_COLORS, n) for n in range(regions)])
-        limits = {"vmin": -0.5, "vmax": regions - 0.5}
-        axes.imshow(section.region, cmap=colors, origin="lower", extent=extent, interpolation="nearest", **limits)
+        picture = axes.imshow(section.region, cmap=colors, origin="lower", extent=extent, interpolation="nearest")
+        picture.set_clim(-0.5, regions - 0.5)
     for number, (name, signed) in enumerate(section.bodies.items()):
         color = _color(BODY_COLORS, number)
         rows, columns = signed.shape
@@ -92,7 +93,7 @@ def _draw(axes: Axes, section: Section, regions: int) -> None:
     for name, points in section.gauges.items():
         axes.plot(*(points / length).T, "k+", markersize=8)
         axes.annotate(name, points[0] / length, xytext=(3, 3), textcoords="offset points", fontsize="x-small")
-    axes.set(xlim=extent[:2], ylim=extent[2:], title=section.place, aspect="equal")
+    axes.set(xlim=extent[:2], ylim=extent[2:], title=section.label, aspect="equal")
     axes.set_xlabel(f"{section.axes[0]} [{metres}]")
     if len(section.axes) > 1:
         axes.set_ylabel(f"{section.axes[1]} [{metres}]")
@@ -119,7 +120,7 @@ def draw_view(
     renderer = vtk.vtkRenderer()
     renderer.SetBackground(1.0, 1.0, 1.0)
 
-    def show(source: object, color: str, opacity: float = 1.0) -> None:
+    def show(source: Any, color: str, opacity: float = 1.0) -> None:
         mapper = vtk.vtkPolyDataMapper()
         mapper.SetInputConnection(source.GetOutputPort())
         mapper.ScalarVisibilityOff()

@@ -12,9 +12,12 @@ from typing import Literal
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -26,7 +29,7 @@ Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 DetonationPath = Literal["straight", "around"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -187,6 +190,16 @@ class Afterburn:
 
 
 @dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -201,6 +214,7 @@ class Fluid:
     sharpening: bool = False
     detonation: Detonation | None = None
     afterburn: Afterburn | None = None
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -230,14 +244,18 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
+    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
+
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
+    `friction`: Coulomb's coefficient between bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -248,6 +266,8 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    obstacles: bool = False
+    friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
@@ -259,12 +279,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:
@@ -280,7 +301,7 @@ class Time:
     """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
-    `wall_clock_limit` [s] of computing.
+    `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
     """
 
     end: float
@@ -288,6 +309,7 @@ class Time:
     maximum_steps: int | None
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
+    smallest_step: float = 1e-3
 
 
 @dataclass(frozen=True)
@@ -304,8 +326,8 @@ class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
     `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
-    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
-    is by a file called `stop_file`.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only at the end (`restart_at_end`)
+    and when the run is stopped, as it is by a file called `stop_file` in the directory.
     """
 
     directory: str
@@ -316,6 +338,7 @@ class Output:
     hdf5: Hdf5 = "mpi-io"
     restart_every: float = 0.0
     stop_file: str = "stop"
+    restart_at_end: bool = True
 
 
 @dataclass(frozen=True)

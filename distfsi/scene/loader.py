@@ -53,8 +53,9 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
     shapes: list[tuple[Path, Shape | None]] = []
     for n, region in enumerate(scene.fluid.regions if scene.fluid else ()):
         shapes.append((("fluid", "regions", n, "shape"), region.shape))
+    kind = "obstacles" if scene.solid and scene.solid.obstacles else "bodies"
     for body in scene.solid.bodies if scene.solid else ():
-        shapes += [(("solid", "bodies", body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
+        shapes += [(("solid", kind, body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
     for path, shape in shapes:
         for mesh in meshes_in(shape):
             if count := mesh.surface.open_edges:

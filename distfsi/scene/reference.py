@@ -52,9 +52,12 @@ SECTIONS = {
     "`[[charges]]`": ("ChargeInput",),
     "`[fluid.afterburn]`": ("AfterburnSectionInput",),
     "`law` of the afterburn": _names(Afterburn),
+    "`[fluid.map]`": ("MapInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
+    "`[solid.obstacles.NAME]`": ("ObstacleInput",),
+    "`[solid.obstacles.NAME.motion]`": ("MotionInput",),
     "`eos` of a body": _names(SolidEos),
     "`strength` of a body": _names(Strength),
     "`failure` of a body": (*_names(Failure), "Scatter"),
@@ -126,6 +129,8 @@ def _values(node: Json) -> str:
     for option in options:
         if "discriminator" in option:
             choice = option["discriminator"]
+            if "union" in choice["mapping"]:
+                return "table of a shape"
             return f"table with `{choice['propertyName']}` " + ", ".join(f'`"{word}"`' for word in choice["mapping"])
         if "unit" in option:
             limits = [f"{sign} {option[key]:g}" for key, sign in LIMITS.items() if key in option]
@@ -136,7 +141,9 @@ def _values(node: Json) -> str:
     types = {option.get("type") for option in options}
     if "boolean" in types:
         return "`true`, `false`" + (", table" if any("$ref" in option for option in options) else "")
-    return "text" if "string" in types else "list of tables" if "array" in types else "table"
+    if "array" in types:
+        return "list of vectors, " + items["unit"] if "unit" in (items := node.get("items", {})) else "list of tables"
+    return "text" if "string" in types else "table"
 
 
 if __name__ == "__main__":

@@ -62,6 +62,22 @@ def has_true_distance(shape: Shape) -> bool:
     return shape.exact if isinstance(shape, Composed) else True
 
 
+def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k); of
+    a composed one to its surface as a whole."""
+    match shape:
+        case Box(lower, upper):
+            return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
+        case Tube(center, inner, outer):
+            r = _radius(points, center)
+            return np.stack([inner - r, r - outer], axis=1)
+        case Cylinder(start, end, outer, inner):
+            along, r = cylinder_coordinates(shape, points)
+            hole = [inner - r] if inner > 0.0 else []
+            return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
+    return distance(shape, points)[:, None]
+
+
 def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance [m] along the axis, from its start, and from the axis, of `points` (n, 3) -> (n,), (n,)."""
     start = np.asarray(shape.start)
@@ -98,8 +114,8 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
                 (high if normal[d] > 0.0 else low)[d] = point[d]
             return tuple(low), tuple(high)
         case Composed():
-            axes = np.eye(shape.dimensions)
-            return tuple(-shape.support(-axis) for axis in axes), tuple(shape.support(axis) for axis in axes)
+            along = np.eye(shape.dimensions)
+            return tuple(-shape.support(-axis) for axis in along), tuple(shape.support(axis) for axis in along)
 
 
 def support(shape: Shape, normal: np.ndarray) -> float:
@@ -120,8 +136,8 @@ def support(shape: Shape, normal: np.ndarray) -> float:
             return shape.support(normal)
 
 
-def volume(shape: Box | Ball | Tube | Cylinder | Composed) -> float:
-    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
+def volume(shape: Shape) -> float:
+    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3], infinite of a HalfSpace."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
         case Box(lower, upper):
@@ -132,6 +148,8 @@ def volume(shape: Box | Ball | Tube | Cylinder | Composed) -> float:
             return ball[len(center) - 1] * (outer ** len(center) - inner ** len(center))
         case Cylinder(start, end, outer, inner):
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
+        case HalfSpace():
+            return math.inf
         case Composed():
             return shape.volume()
 
