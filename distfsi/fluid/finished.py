@@ -16,6 +16,7 @@ from distfsi.output.scene_text import describe
 from distfsi.scene.description import Scene
 
 PHASE = "fluid.phases."
+REACTIONS = {"fluid.detonation": "a detonation", "fluid.afterburn": "an afterburn"}
 
 
 class FinishedRun:
@@ -29,7 +30,7 @@ class FinishedRun:
     phases       how many they are
     fractions    1 with two phases, else 0
     contents     (rows + 1, layers or 1, shells): masses, momentum along r (and z), energy, volume fraction of the first
-                 of two phases, and 1, per volume
+                 of two phases, masses of the shares that a phase carries, and 1, per volume
     """
 
     def __init__(self, run: str, scene: Scene):
@@ -51,9 +52,9 @@ class FinishedRun:
         self.contents = self._arranged(restart.array("fluid/cells/state")[:, 0].astype(np.float64), scene)
 
     @property
-    def rows(self) -> int:
-        """Rows of the contents but for the last one."""
-        return len(self.contents) - 1
+    def conserved(self) -> int:
+        """Rows of masses, momentum and energy."""
+        return self.phases + len(self.coordinates.axes) + 1
 
     def _coordinates(self) -> Coordinates:
         """Raises InputError unless they are radial."""
@@ -82,6 +83,9 @@ class FinishedRun:
                 for key in sorted(keys)
                 if here.get(key) != self._there.get(key)
             ]
+        for key, words in REACTIONS.items():
+            if (here[key] == repr(None)) != (self._there.get(key, repr(None)) == repr(None)):
+                faults.append(f"{key}: {self.path} and this scene must both have {words}, or neither")
         if any(known["fluid.precision"] != repr("float64") for known in (here, self._there)):
             faults.append("fluid.precision: only float64 can be mapped, not yet float32")
         if faults:
@@ -92,14 +96,17 @@ class FinishedRun:
         there, fluid = self._names_there, present(scene.fluid)
         P = len(there)
         masses = {name: state[k] for k, name in enumerate(there)}
-        fraction = {there[0]: state[-1], there[-1]: 1.0 - state[-1]} if P == 2 else {there[0]: np.ones(state.shape[1:])}
+        D = len(self.coordinates.axes)
+        first = state[P + D + 1] if P == 2 else np.ones(state.shape[1:])
+        fraction = {there[0]: first} | ({there[1]: 1.0 - first} if P == 2 else {})
         if self.fractions and P == 1:
             (other,) = set(self.names) - set(there)
             trace = fluid.minimum_volume_fraction
             density = next(r.state.density for r in fluid.regions if self.names[r.state.phase] == other)
             masses[other] = np.full(state.shape[1:], trace * density)
             fraction = {there[0]: fraction[there[0]] - trace, other: np.full(state.shape[1:], trace)}
-        motion_and_energy = state[P : P + len(self.coordinates.axes) + 1]
+        motion_and_energy = state[P : P + D + 1]
         rows = [*(masses[name] for name in self.names), *motion_and_energy]
         rows += [fraction[self.names[0]]] if self.fractions else []
+        rows += [*state[P + D + 2 :]]
         return np.stack([*rows, np.ones(state.shape[1:])])

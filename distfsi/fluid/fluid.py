@@ -288,7 +288,10 @@ class Fluid:
     def held_energies(self) -> np.ndarray:
         """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
         first = self.model.fraction + 1
-        shares = [self.cells(b)[first:].astype(np.float64).sum(axis=(1, 2, 3)) for b in range(self.blocks.local_count)]
+        shares = [
+            self.metrics.weighted(self.cells(b)[first:].astype(np.float64), b).sum(axis=(1, 2, 3))
+            for b in range(self.blocks.local_count)
+        ]
         sums = np.reshape(shares, (self.blocks.local_count, len(self.model.carried)))
         return self.blocks.sum(sums * self._cell_volume()) * self.model.constants["HELD_ENERGY"]
 
