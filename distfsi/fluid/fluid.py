@@ -76,7 +76,7 @@ class Fluid:
         self._signal: float | None = None
         self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
-        self.reactions = Reactions(given, model, blocks, device, real) if model.carried else None
+        self.reactions = Reactions(scene, model, blocks, device) if model.carried else None
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))

@@ -105,7 +105,7 @@ def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation
     index, burn = _index(phases, given.phase), given.burn.build()
     found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
     burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
-    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators), given.path)
 
 
 def _map(given: MapInput, dimensions: int) -> Map:

@@ -27,6 +27,7 @@ TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
+DetonationPath = Literal["straight", "around"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
@@ -171,11 +172,13 @@ Detonator = PointDetonator | LineDetonator | PlaneDetonator
 
 @dataclass(frozen=True)
 class Detonation:
-    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+    """How the explosive, a phase, burns, all numbers of its law known; what lights it, and whether fronts run straight
+    or around what is no explosive at the start."""
 
     phase: int
     burn: Burn
     detonators: tuple[Detonator, ...]
+    path: DetonationPath = "straight"
 
 
 @dataclass(frozen=True)
