@@ -123,7 +123,7 @@ def run(
         identity = ""
         with ExitStack() as noted:
             while True:
-                simulation = Simulation.of(scene, communicator, threads, costs, device)
+                simulation = Simulation.of(scene, communicator, threads, costs, device, resumed=origin is not None)
                 simulation.requested, simulation.timers = requests.strongest, timers
                 budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
                 records = Records(simulation, budget, performance, files)
@@ -139,6 +139,8 @@ def run(
                     noted.enter_context(journal)
                 records.open(identity, origin)
                 if not origin:
+                    if simulation.fluid and simulation.fluid.mapping:
+                        progress.say("\n".join(simulation.fluid.mapping.lines()))
                     simulation.watch()
                     records.write()
                 costs = advance(simulation, records, kept, requests, progress)

@@ -20,7 +20,7 @@ from distfsi.diagnostics.derived import DerivedFields
 from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks
 from distfsi.diagnostics.schlieren import Schlieren
-from distfsi.errors import Diverged, InputError, StepFailed
+from distfsi.errors import Diverged, InputError, StepFailed, StepTooShort
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -29,6 +29,7 @@ from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
+from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
@@ -51,6 +52,7 @@ class Simulation:
               `snapshot()` and `restore(snapshot)`
     derived   fields of the cells for the output files, beside those of the fluid
     last_step the step made last
+    first_step  the longest stable step [s] at the start
     named     what set steps, with the cell or particle, as it was named last
     loaded    whether the fluid has pressed on the solid by more than the scene's limit
     alone     whether by less since, so that it was dropped, and the solid goes on alone
@@ -69,6 +71,7 @@ class Simulation:
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
+    first_step: float = 0.0
     named: dict[Reason, str] = field(default_factory=dict)
     loaded: bool = False
     alone: bool = False
@@ -82,21 +85,26 @@ class Simulation:
         threads: int | None = None,
         costs: np.ndarray | None = None,
         device: Device | None = None,
+        resumed: bool = False,
     ) -> Simulation:
         """Build the parts the scene needs, and no others.
 
-        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
+        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads; `resumed`: a
+        snapshot will be restored.
         """
         blocks = deal_blocks(scene, communicator, costs)
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if model else None
-        solid = Solid(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if model else None
+        structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
+        solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupling: Coupling | None = None
         if model and fluid and solid:
             coupled = COUPLINGS[scene.coupling.scheme]
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        if fluid and fluid.mapping:
+            simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)
@@ -115,6 +123,8 @@ class Simulation:
         """Advance everything by one step."""
         try:
             made = self._advance()
+        except StepTooShort:
+            raise
         except Diverged as error:
             faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
             if isinstance(error, StepFailed):
@@ -135,7 +145,19 @@ class Simulation:
         """Plan a step and make it."""
         fluid, solid, coupling = self._active
         find_forces(solid, coupling, self.timers)
-        return make_step(fluid, solid, coupling, self.time_step(), self.timers)
+        planned = self.time_step()
+        self._refuse_short(planned)
+        return make_step(fluid, solid, coupling, planned, self.timers)
+
+    def _refuse_short(self, planned: TimeStep) -> None:
+        """Collective. Raise StepTooShort where a step is planned that would never get to the end of the run."""
+        self.first_step = self.first_step or planned.stable
+        smallest = self.scene.time.smallest_step
+        if planned.reason is not Reason.END and planned.stable < smallest * self.first_step:
+            cause = planned.name_reason(self.fluid, self.communicator)
+            when = f"at t = {self.time:.6g} s, after {self.steps} steps"
+            limit = f"less than {smallest:g} of the first, {self.first_step:.3g} s (time.smallest_step)"
+            raise StepTooShort(f"the stable time step is {planned.stable:.3g} s {when}, {limit}: {cause}")
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
@@ -221,13 +243,14 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """What a restart needs besides the parts."""
-        names = ("time", "steps", "loaded", "alone")
+        names = ("time", "steps", "first_step", "loaded", "alone")
         return {"values": {name: np.array(getattr(self, name)) for name in names}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         values = snapshot["values"]
         self.time, self.steps = float(values["time"]), int(values["steps"])
+        self.first_step = float(values["first_step"])
         self.loaded, self.alone = bool(values["loaded"]), bool(values["alone"])
 
     @property
@@ -250,7 +273,7 @@ class Simulation:
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
     """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
-    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene))
+    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene), domain.coordinates)
     blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
     if scene.solid is None or costs is not None:
         return blocks

@@ -22,7 +22,7 @@ LAYERS = (
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},
-    {"gauges"},
+    {"gauges", "coordinates"},
     {"laws"},
     {"formulas"},
     {"air_blast", "errors", "interrupts", "narrowing", "__init__"},

@@ -15,6 +15,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import mpi_output
+from distfsi.coordinates.planar import PLANAR
 from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
@@ -178,7 +179,9 @@ class OneRank:
 
 @pytest.fixture
 def small_blocks():
-    grid = SimpleNamespace(dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0))
+    grid = SimpleNamespace(
+        dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0), coordinates=PLANAR
+    )
     return SimpleNamespace(grid=grid, block_cells=(4, 3, 1), origin=np.array([[0, 0, 0], [4, 0, 0]]))
 
 

@@ -25,6 +25,7 @@ from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_roo
 
 LARGEST_LAYER = 1000  # cells along an axis that a picture takes
 KINDS = ("cells", "particles")
+AXES = "distfsi axes"  # attribute of a cells file: the names of the axes where they are not x, y, z
 
 Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype]]  # of one cell's or particle's value, and its type, by name
 Fill = Callable[[h5py.File, float], Mapping[str, h5py.Dataset]]
@@ -170,6 +171,13 @@ def read_grid(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.maximum(attributes["WholeExtent"][1::2], 1), attributes["Origin"], attributes["Spacing"]
 
 
+def read_axes(path: Path) -> str:
+    """Names of the axes of a cells file: those of its coordinates, filled up from x, y, z."""
+    with h5py.File(path) as file:
+        named = file["VTKHDF"].attrs.get(AXES, "")
+        return named + "xyz"[len(named) :]
+
+
 def axis_across(path: Path) -> int:
     """The axis across the only layer of a cells file; z if it has several."""
     cells, _, _ = read_grid(path)
@@ -205,6 +213,8 @@ def _fill_cells(
     root.attrs["Origin"] = np.array(grid.lower, dtype=float)
     root.attrs["Spacing"] = np.array(grid.spacing, dtype=float)
     root.attrs["Direction"] = np.eye(3).ravel()
+    if grid.coordinates.radial:
+        root.attrs[AXES] = grid.coordinates.axes
     data = root.create_group("CellData")
     return {
         name: create_dataset(data, name, tuple(cells[::-1]) + parts, dtype, chunk + parts)

@@ -134,7 +134,8 @@ def _remove_oldest(directory: Path) -> None:
 
 
 class Restart:
-    """A restart file: its path, by which run it was written, after which step and at which time [s], and the scene."""
+    """A restart file: its path, by which run it was written, after which step and at which time [s], and the scene as
+    `describe` gives it."""
 
     def __init__(self, path: str | Path, communicator: Communicator | None = None):
         """Collective; None: this process alone. Raises InputError on all ranks when `path` is no complete restart file
@@ -144,16 +145,21 @@ class Restart:
         if not cause:
             found = _contents(self.path) if communicator is None or communicator.rank == 0 else None
             found = present(communicator.broadcast(found) if communicator else found)
-            self.run, self.step, self.time, self._scene, cause = found
+            self.run, self.step, self.time, self.scene, cause = found
         if cause:
             raise InputError([f"{path}: is no complete restart file: {cause}"])
+
+    def array(self, name: str) -> np.ndarray:
+        """A whole array, by its name in the file."""
+        with h5py.File(self.path) as file:
+            return file[name][()]
 
     def changes(self, scene: Any) -> list[str]:
         """What has changed since the restart file was written and bears on the results, although it may.
 
         Raises InputError with one line per key that differs and may not.
         """
-        return changes(self._scene, describe(scene), self.path)
+        return changes(self.scene, describe(scene), self.path)
 
     def restore(self, parts: Mapping[str, Any], blocks: FilledBlocks, communicator: Communicator) -> None:
         """Collective. Bring back the parts that were kept; gauges and peaks that are new stay as they are.

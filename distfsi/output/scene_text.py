@@ -10,7 +10,7 @@ from typing import Any
 from distfsi.errors import InputError
 
 # What may change at a restart: as it likes, or so that the user is told.
-FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit")
+FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit", "time.smallest_step")
 REPORTED = ("time.end", "time.maximum_steps", "time.cfl")
 
 

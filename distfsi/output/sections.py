@@ -31,7 +31,7 @@ class Section:
 
     axes     names of the horizontal and, but in one dimension, the vertical one
     extent   left, right, bottom, top [m]
-    place    where the plane lies, in words
+    label    where the plane lies, in words
     region   (rows, columns) number of the region at each point; None without a fluid
     bodies   by name the signed distance [m] (rows, columns) to its surface
     particles  by name those in the plane (n, 2) [m]
@@ -40,7 +40,7 @@ class Section:
 
     axes: tuple[str, ...]
     extent: tuple[float, float, float, float]
-    place: str
+    label: str
     region: np.ndarray | None
     bodies: Mapping[str, np.ndarray]
     particles: Mapping[str, np.ndarray]
@@ -93,7 +93,7 @@ def _draw(axes: Axes, section: Section, regions: int) -> None:
     for name, points in section.gauges.items():
         axes.plot(*(points / length).T, "k+", markersize=8)
         axes.annotate(name, points[0] / length, xytext=(3, 3), textcoords="offset points", fontsize="x-small")
-    axes.set(xlim=extent[:2], ylim=extent[2:], title=section.place, aspect="equal")
+    axes.set(xlim=extent[:2], ylim=extent[2:], title=section.label, aspect="equal")
     axes.set_xlabel(f"{section.axes[0]} [{metres}]")
     if len(section.axes) > 1:
         axes.set_ylabel(f"{section.axes[1]} [{metres}]")

@@ -33,9 +33,9 @@ def draw_scene(scene: Scene, path: Path) -> Iterator[Path]:
     planes = [Plane.across(scene, normal) for normal in {1: (1,), 2: (2,), 3: (2, 1, 0)}[domain.dimensions]]
     yield draw_sections(path, scene.title, [_section(scene, plane, particles) for plane in planes], regions)
     if domain.dimensions == 3 and find_spec("vtk") is not None:
-        balls = {body.name: (particles[body.name], body.spacing) for body in bodies}
+        spheres = {body.name: (particles[body.name], body.spacing) for body in bodies}
         view = path.with_name(f"{path.stem}-view{path.suffix}")
-        yield draw_view(view, (domain.lower, domain.upper), balls, list(_surfaces(scene)))
+        yield draw_view(view, (domain.lower, domain.upper), spheres, list(_surfaces(scene)))
 
 
 def _regions(scene: Scene) -> tuple[Region, ...]:
@@ -64,13 +64,13 @@ class Plane:
     axes    the horizontal and, but in one dimension, the vertical one
     normal  the axis that it lies across, in 3D
     spans   horizontal and vertical, low and high end [m]
-    place   (D,) [m] a point of it
+    through  (D,) [m] a point of it
     """
 
     axes: tuple[int, ...]
     normal: int | None
     spans: tuple[tuple[float, float], tuple[float, float]]
-    place: np.ndarray
+    through: np.ndarray
 
     @classmethod
     def across(cls, scene: Scene, normal: int) -> Plane:
@@ -87,7 +87,7 @@ class Plane:
         counts = [max(8, math.ceil(PIXELS * (b - a) / longest)) for a, b in self.spans]
         steps = [a + (np.arange(n) + 0.5) * (b - a) / n for (a, b), n in zip(self.spans, counts, strict=True)]
         vertical, horizontal = np.meshgrid(*reversed(steps), indexing="ij")
-        points = np.tile(self.place, (vertical.size, 1))
+        points = np.tile(self.through, (vertical.size, 1))
         for axis, values in zip(self.axes, (horizontal, vertical), strict=False):
             points[:, axis] = values.ravel()
         return points, (counts[1], counts[0])
@@ -95,7 +95,7 @@ class Plane:
     def flat(self, points: np.ndarray, reach: float = math.inf) -> np.ndarray:
         """Those of `points` (n, D) that are no farther than `reach` [m] from it, on it, (k, 2) [m]."""
         if self.normal is not None:
-            points = points[np.abs(points[:, self.normal] - self.place[self.normal]) <= reach]
+            points = points[np.abs(points[:, self.normal] - self.through[self.normal]) <= reach]
         columns = [points[:, axis] for axis in self.axes]
         return np.stack([*columns, *[np.full(len(points), np.mean(self.spans[1]))] * (len(columns) == 1)], axis=1)
 
@@ -107,19 +107,19 @@ def _section(scene: Scene, plane: Plane, particles: Mapping[str, np.ndarray]) ->
     for number, part in enumerate(_regions(scene)):
         if part.shape is not None:
             region[contains(part.shape, points)] = number
-    positions = {name: gauge.positions().values() for name, gauge in scene.gauges.items()}
-    whole = {name: [list(place.values()) for place in places] for name, places in positions.items()}
+    given = {name: gauge.positions().values() for name, gauge in scene.gauges.items()}
+    whole = {name: [list(point.values()) for point in points] for name, points in given.items()}
     return Section(
         tuple(AXES[axis] for axis in plane.axes),
         (*plane.spans[0], *plane.spans[1]),
-        "" if plane.normal is None else f"{AXES[plane.normal]} = {plane.place[plane.normal]:.4g} m",
+        "" if plane.normal is None else f"{AXES[plane.normal]} = {plane.through[plane.normal]:.4g} m",
         region.reshape(shape) if scene.fluid else None,
         {body.name: distance(body.shape, points).reshape(shape) for body in bodies},
         {body.name: plane.flat(particles[body.name], 0.5 * body.spacing) for body in bodies},
         {
-            name: plane.flat(np.array(places))
-            for name, places in whole.items()
-            if places and len(places[0]) == scene.domain.dimensions
+            name: plane.flat(np.array(points))
+            for name, points in whole.items()
+            if points and len(points[0]) == scene.domain.dimensions
         },
     )
 

@@ -12,9 +12,12 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, WrapVal
 
 from distfsi.scene import composed, description
 from distfsi.scene.cloud import Cloud
-from distfsi.scene.composed import Similarity, extruded, placed, reflection, revolved, rotation
+from distfsi.scene.composed import Similarity, placed
+from distfsi.scene.sections import Polygon as PolygonShape
+from distfsi.scene.sections import extruded, revolved
 from distfsi.scene.shapes import dimensions, support
 from distfsi.scene.surface import Mesh
+from distfsi.scene.turns import reflection, rotation
 from distfsi.scene.values import Count, Direction, Length, Position, Table, quantity
 
 if TYPE_CHECKING:
@@ -208,7 +211,7 @@ class Polygon(Composed):
     def build(self) -> description.Shape:
         if any(len(point) != 2 for point in self.points):
             raise ValueError("a polygon needs two dimensions; in three it is a section of `extrude` or `revolve`")
-        polygon = composed.Polygon(self.points)
+        polygon = PolygonShape(self.points)
         if any(a == b for a, b in polygon.edges()):
             raise ValueError("has two corners at one place, one after the other")
         if polygon.crosses_itself():
@@ -262,7 +265,9 @@ def _beside_the_input(value: str, info: ValidationInfo) -> str:
 
 
 FileName = Annotated[str, AfterValidator(_beside_the_input)]
-Unit = Annotated[str, Field(description='of its lengths, which the file itself does not know: "m", "mm", "in" ...')]
+Unit = Annotated[
+    str, Field(description='unit of its lengths, which the file itself does not know: "m", "mm", "in" ...')
+]
 
 
 class MeshFile(Composed):

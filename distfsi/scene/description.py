@@ -12,8 +12,12 @@ from typing import Literal
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn as AfterburnLaw
+from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -24,7 +28,7 @@ Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -137,6 +141,62 @@ class Region:
 
 
 @dataclass(frozen=True)
+class PointDetonator:
+    """Lights the explosive from `position` [m] after `delay` [s]."""
+
+    position: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineDetonator:
+    """Lights it from all points of the line from `start` to `end` [m] at once, after `delay` [s]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlaneDetonator:
+    """Lights it from all of the plane through `point` [m] at once, after `delay` [s]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    delay: float = 0.0
+
+
+Detonator = PointDetonator | LineDetonator | PlaneDetonator
+
+
+@dataclass(frozen=True)
+class Detonation:
+    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+
+    phase: int
+    burn: Burn
+    detonators: tuple[Detonator, ...]
+
+
+@dataclass(frozen=True)
+class Afterburn:
+    """How the products, a phase, burn with air."""
+
+    phase: int
+    law: AfterburnLaw
+
+
+@dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -149,6 +209,9 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    detonation: Detonation | None = None
+    afterburn: Afterburn | None = None
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -178,14 +241,18 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
+    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
+
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
+    `friction`: Coulomb's coefficient between bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -196,6 +263,8 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    obstacles: bool = False
+    friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
@@ -207,12 +276,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:
@@ -228,7 +298,7 @@ class Time:
     """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
-    `wall_clock_limit` [s] of computing.
+    `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
     """
 
     end: float
@@ -236,6 +306,7 @@ class Time:
     maximum_steps: int | None
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
+    smallest_step: float = 1e-3
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from functools import lru_cache
 import numpy as np
 
 from distfsi.scene.cloud import Cloud
-from distfsi.scene.composed import Extrusion, Placed, Union, faces
+from distfsi.scene.composed import Placed, Union, faces
 from distfsi.scene.description import Packing, Shape
 from distfsi.scene.relaxation import relaxed
+from distfsi.scene.sections import Extrusion
 from distfsi.scene.shapes import bounding_box, contains, volume
 
 NARROWEST, WIDEST = 0.7, 1.45  # of a spacing: layers between two faces

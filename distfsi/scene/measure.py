@@ -11,22 +11,28 @@ import numpy as np
 Distance = Callable[[np.ndarray], np.ndarray]
 
 CUBES = {1: 64, 2: 32, 3: 12}  # along the longest edge, to begin with
-MAXIMUM_CUBES = 150_000  # looked at in one pass
+MAXIMUM_CUBES = 100_000
 SMALLEST = 1e-6  # of the longest edge: cubes at corners, of which there are few
 FLAT = 1e-7  # of a cube's size: a surface that deviates less from a plane is one
 SMOOTH = 0.1  # the same of one without edges, which may be curved
+TOGETHER = 1000  # cubes whose points are looked at together
 SUBPOINTS = {1: 64, 2: 16, 3: 6}  # per axis of a cube with edges
 
 
 def measure(
-    distance: Distance, lower: np.ndarray, upper: np.ndarray, faces: Sequence[Set[float]] | None = None
+    distance: Distance,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    faces: Sequence[Set[float]] | None = None,
+    cubes: int = MAXIMUM_CUBES,
 ) -> float:
     """Length, area or volume of the points inside the box [lower, upper] (D,) [m] whose `distance` is negative.
 
     `faces`: along each axis the coordinates of all the region's faces, where these are planes across the axes; then it
     is exact. Otherwise boxes that the surface may cut are halved along each axis, until it is flat: what a plane cuts
     off a box is exact. In the smallest boxes a curved surface is a plane, too, and points are counted beside edges;
-    this error goes with the square of their size, so most of it is extrapolated away from the last two passes.
+    this error goes with the square of their size, so most of it is extrapolated away from the last two passes. At most
+    so many `cubes` are looked at in one pass.
     """
     if faces is not None:
         return _between_faces(distance, lower, upper, faces)
@@ -45,7 +51,7 @@ def measure(
         parts, flat = parts_inside(distance, centers, signed, size, SMOOTH)
         sums.append(math.fsum(parts[flat]) * math.prod(size))
         total = math.fsum([*sums, math.fsum(parts[~flat]) * math.prod(size)])
-        if len(centers) * 2**D > MAXIMUM_CUBES or size.max() < SMALLEST * (upper - lower).max():
+        if len(centers) * 2**D > cubes or size.max() < SMALLEST * (upper - lower).max():
             return total + (total - before) / 3.0
         before = total
         centers = (centers[~flat][:, None] + children).reshape(-1, D)
@@ -63,10 +69,10 @@ def parts_inside(
     error = _deviation(distance, centers, signed, slopes, size)
     parts, rough = parts_below(signed, slopes * size), np.flatnonzero(error > smooth)
     offsets = _grid(SUBPOINTS[len(size)], len(size)) * size
-    hits = np.zeros(len(rough))
-    for offset in offsets:
-        hits += distance(centers[rough] + offset) < 0.0
-    parts[rough] = hits / len(offsets)
+    for first in range(0, len(rough), TOGETHER):
+        some = rough[first : first + TOGETHER]
+        points = (centers[some][:, None] + offsets).reshape(-1, len(size))
+        parts[some] = (distance(points) < 0.0).reshape(len(some), -1).mean(axis=1)
     return parts, error < FLAT
 
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from distfsi.scene.cloud import Cloud
 from distfsi.scene.composed import Intersection
 from distfsi.scene.description import Ball, Body, Box, Composed, Cylinder, HalfSpace, Tube
 from distfsi.scene.fitting import fits_by_itself, fitted
@@ -21,7 +22,7 @@ def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tupl
     through the center between particles. What is composed: scene/fitting.py.
     """
     shape = body.shape
-    if isinstance(shape, Composed) and is_its_bounding_box(shape):
+    if isinstance(shape, Composed) and not isinstance(shape, Cloud) and is_its_bounding_box(shape):
         shape = Box(*bounding_box(shape))
     elif isinstance(shape, Composed) or body.packing == "relaxed":
         return _composed(body, lower, upper)

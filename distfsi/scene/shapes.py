@@ -62,6 +62,22 @@ def has_true_distance(shape: Shape) -> bool:
     return shape.exact if isinstance(shape, Composed) else True
 
 
+def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k); of
+    a composed one to its surface as a whole."""
+    match shape:
+        case Box(lower, upper):
+            return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
+        case Tube(center, inner, outer):
+            r = _radius(points, center)
+            return np.stack([inner - r, r - outer], axis=1)
+        case Cylinder(start, end, outer, inner):
+            along, r = cylinder_coordinates(shape, points)
+            hole = [inner - r] if inner > 0.0 else []
+            return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
+    return distance(shape, points)[:, None]
+
+
 def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance [m] along the axis, from its start, and from the axis, of `points` (n, 3) -> (n,), (n,)."""
     start = np.asarray(shape.start)
