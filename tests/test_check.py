@@ -7,7 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from distfsi.commands.line import main
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
@@ -63,11 +65,39 @@ def test_the_report_counts_what_the_scene_holds():
     assert "3 have none" in report(load(SOD, ["performance.block_cells=400"]), ranks=4)
 
 
+def test_former_words_are_in_the_report():
+    notes = [line for line in report(load(TUBE, ["coupling.scheme=stairs"])).splitlines() if line.startswith("  note ")]
+    assert len(notes) == 1 and "'stairs' is called 'staircase' now" in notes[0]
+
+
 def test_check_by_the_command_line(tmp_path, monkeypatch):
     command = [sys.executable, "-m", "distfsi", "check", str(SOD), "--ranks", "2"]
     told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert told.returncode == 0 and told.stderr == ""
     assert told.stdout.startswith("Sod's shock tube\n")
+
+
+def test_check_draws_the_scene(tmp_path, monkeypatch, capsys):
+    """Sections in any number of dimensions, and a view in three."""
+    pytest.importorskip("vtk")
+    monkeypatch.chdir(tmp_path)
+    drop = "[domain]\nlower = [0, 0, 0]\nupper = [1, 1, 1]\ncells = [4, 4, 4]\n[time]\nend = 1.0\n"
+    gas = '[fluid.phases.air]\neos = "ideal_gas"\ngamma = 1.4\n[[fluid.regions]]\nphase = "air"\ndensity = 1.0\n'
+    more = 'pressure = 1.0\n[[fluid.regions]]\nphase = "air"\ndensity = 2.0\npressure = 2.0\n'
+    region = 'shape = { kind = "ball", center = [0.2, 0.2, 0.2], radius = 0.1 }\n'
+    block = 'spacing = 0.1\nshape = { kind = "box", lower = [0.4, 0.4, 0.4], upper = [0.8, 0.6, 0.6] }\n'
+    gauge = '[gauges.near]\nkind = "point"\nposition = [0.9, 0.9, 0.9]\n'
+    (tmp_path / "drop.toml").write_text(drop + gas + more + region + "[solid.obstacles.block]\n" + block + gauge)
+    main(["check", str(SOD), "--picture", "sod.png"])
+    main(["check", "drop.toml", "--picture"])
+    assert capsys.readouterr().out.splitlines()[-2:] == ["drop-scene.png", "drop-scene-view.png"]
+    for name in ("sod", "drop-scene", "drop-scene-view"):
+        assert np.ptp(pixels(tmp_path / f"{name}.png")) > 100
+
+
+def pixels(path):
+    """(rows, columns, 3) of 0 to 255."""
+    return np.asarray(Image.open(path).convert("RGB"))
 
 
 # ---- steps -----------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given
@@ -18,7 +19,8 @@ from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.laws.solid.strength.linear_hardening import LinearHardening
 from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.laws.sources.gravity import Gravity
-from distfsi.scene import load, schema
+from distfsi.scene import load, mirrors, schema
+from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.description import Ball
 from distfsi.scene.reference import markdown
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
@@ -278,6 +280,10 @@ def words(kind):
     return ", ".join(repr(word_of(law)) for law in laws_of(kind))
 
 
+SIMPLE = (mirrors.Box, mirrors.Ball, mirrors.HalfSpace, mirrors.Tube, mirrors.Cylinder)
+SHAPES = [repr(get_args(table.model_fields["kind"].annotation)[0]) for table in (*SIMPLE, *TABLES)]
+
+
 def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     sections = ", ".join(
         f"'{name}'"
@@ -286,6 +292,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "domain",
             "time",
             "fluid",
+            "charges",
             "solid",
             "sources",
             "output",
@@ -297,7 +304,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     assert faults(BROKEN) == [
         f"titel (line 1): unknown key; expected one of {sections}; did you mean 'title'?",
         'domain.upper (line 4): [1, "2 kg"] has units kg, needs m',
-        "domain.x.1 (line 6): \"outflw\"; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic'; "
+        "domain.x.1 (line 6): \"outflw\"; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic', 'axis'; "
         "did you mean 'outflow'?",
         'time.end (line 8): "-1 us"; must be > 0',
         "time.cfl (line 9): true is no number; expected one",
@@ -307,15 +314,13 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
         "did you mean 'gamma'?",
         'fluid.regions.0.density (line 18): "1.2 kg/m2" has units kg/m2, needs kg/m3',
         "fluid.regions.1.phase (line 22): \"aer\"; expected one of 'air', 'sea water'; did you mean 'air'?",
-        "fluid.regions.1.shape.kind (line 25): \"bal\"; expected one of 'box', 'ball', 'half_space', 'tube', "
-        "'cylinder'; did you mean 'ball'?",
+        f"fluid.regions.1.shape.kind (line 25): \"bal\"; expected one of {', '.join(SHAPES)}; did you mean 'ball'?",
         "solid.bodies.tube.density (line 26): is missing; expected density at rest [kg/m3]",
         "solid.bodies.tube.shape.center (line 27): [0] has 1 entries, needs 2, one per dimension of the domain",
         "solid.bodies.tube.spacing (line 28): \"0.1 fs\" has the unknown unit 'fs'; did you mean 's'?",
         "solid.bodies.tube.eos (line 29): 3; expected a table",
         f"solid.bodies.tube.strength (line 30): \"nne\"; expected one of {words(Strength)}; did you mean 'none'?",
-        "solid.bodies.tube.fixed.kind (line 31): is missing; expected one of 'ball', 'box', 'cylinder', 'half_space', "
-        "'tube'",
+        f"solid.bodies.tube.fixed.kind (line 31): is missing; expected one of {', '.join(sorted(SHAPES))}",
         "output.history_every (line 33): 1.5; it should be a valid integer",
         "performance.tile_cells.0 (line 35): 0; must be >= 1",
     ]
@@ -328,7 +333,8 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
         (['domain.x=["periodic", "wall"]'], "domain.x (--set): one end is periodic; expected both or none"),
         (
             ['domain.x=["wall"]'],
-            "domain.x.1 (--set): is missing; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic'",
+            "domain.x.1 (--set): is missing; "
+            "expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic', 'axis'",
         ),
         (["domain.x=wall"], 'domain.x (--set): "wall"; expected a list'),
         (['domain.y=["wall", "wall"]'], "domain.y (--set): the domain has 1 dimension(s), so no y ends"),

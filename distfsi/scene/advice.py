@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Domain, Fluid, HalfSpace, Scene, Shape, Tube
+from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
 
@@ -79,7 +79,7 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
 
 
 def thickness(body: Body, domain: Domain) -> float | None:
-    """Smallest extent of a body inside the domain [m]; None for a half space, which has none."""
+    """Smallest extent of a body inside the domain [m]; None for a half space and for what is composed."""
     if isinstance(body.shape, Box):
         low, high = np.maximum(body.shape.lower, domain.lower), np.minimum(body.shape.upper, domain.upper)
         return float(np.min(high - low))
@@ -116,7 +116,8 @@ def _excess_cells(scene: Scene) -> Iterator[str]:
 
 def _excess_dimensions(scene: Scene) -> Iterator[str]:
     domain = scene.domain
-    for axis in range(domain.dimensions if domain.dimensions > 1 else 0):
+    first = 1 if domain.coordinates.radial else 0
+    for axis in range(first, domain.dimensions if domain.dimensions > 1 else 0):
         if _constant_along(scene, axis):
             yield f"nothing varies along {AXES[axis]}: {domain.dimensions - 1} dimension(s) without it give the same"
             return
@@ -154,6 +155,8 @@ def _turns_around(scene: Scene, axis: int) -> bool:
     shapes, domain = _shapes(scene), scene.domain
     centers = {tuple(s.center[a] for a in across) for s in shapes if isinstance(s, Ball | Tube)}
     flat = [s for s in shapes if isinstance(s, HalfSpace | Box)]
+    if any(isinstance(s, Composed) for s in shapes):
+        return False
     if len(centers) != 1 or not all(_spans(shape, domain, a) for shape in flat for a in across):
         return False
     (center,) = centers

@@ -11,11 +11,14 @@ import numpy as np
 
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
-from distfsi.scene.build import AXES, SIDES
+from distfsi.narrowing import present
+from distfsi.scene.build import AXES, SIDES, stop_file_in
+from distfsi.scene.cloud import Cloud
+from distfsi.scene.coordinate_checks import check_coordinates
 from distfsi.scene.description import (
     Ball,
     Body,
-    Box,
+    Composed,
     Cylinder,
     Domain,
     Fluid,
@@ -25,9 +28,10 @@ from distfsi.scene.description import (
     Solid,
     Tube,
 )
+from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
+from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
-from distfsi.scene.overlaps import overlap
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     CouplingInput,
@@ -42,6 +46,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
+LONGEST_NAME = 255  # bytes of a file's name
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -59,6 +64,7 @@ def check(
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
+    faults += check_coordinates(sections, domain, fluid, solid)
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself
@@ -67,6 +73,7 @@ def check(
     yield from check_output(sections.output, present, domain)
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
+        yield from check_obstacles(sections, solid, domain, "fluid" in present)
         yield from check_solid(solid, domain)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
@@ -107,6 +114,7 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+    yield from check_reactions(given, fluid)
 
 
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
@@ -123,6 +131,8 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
         yield Fault((*path, "density"), text)
         return
     cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
+    if fluid.detonation is not None and fluid.detonation.phase == state.phase:
+        cold_pressure = 0.0  # what is unburnt has no energy yet, and is no gas
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
@@ -143,6 +153,27 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
 
 
+def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """There is something; and obstacles are what stands in a fluid, alone so far."""
+    given = present(sections.solid)
+    bodies, obstacles = given.bodies, given.obstacles
+    if not (bodies or obstacles):
+        yield Fault(("solid", "bodies"), "is missing; expected [solid.bodies.NAME] or [solid.obstacles.NAME]")
+    if not obstacles:
+        return
+    path = ("solid", "obstacles")
+    if bodies:
+        yield Fault(path, "beside bodies are not known yet; expected one or the other (a body may be held by `fixed`)")
+    if not in_fluid:
+        yield Fault(path, "are what a fluid meets; expected [fluid]")
+    if sections.coupling.scheme == "immersed_boundary":
+        yield Fault(("coupling", "scheme"), "'immersed_boundary' knows no obstacles; expected 'cut_cells'")
+    for body in solid.bodies:
+        if body.motion and any(body.motion.angles) and bool(body.motion.axis) != (domain.dimensions == 3):
+            text = "an axis is needed to turn in 3D" if domain.dimensions == 3 else "only in 3D there is an axis"
+            yield Fault((*path, body.name, "motion"), text)
+
+
 def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
     """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
     if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
@@ -152,7 +183,7 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
             yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
-        path = ("solid", "bodies", body.name)
+        path = (*_bodies_of(solid), body.name)
         faults = list(_check_body(path, body, domain))
         if faults:
             yield from faults
@@ -171,7 +202,12 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
         (a, points_of_a), (b, points_of_b) = first, second
         points, spacings = np.concatenate([points_of_a, points_of_b]), (a.spacing, b.spacing)
         if (thickness := overlap(a.shape, b.shape, points, max(spacings))) > TOUCHING * min(spacings):
-            yield Fault(("solid", "bodies", b.name, "shape"), f"overlaps body '{a.name}' by {thickness:.6g} m")
+            yield Fault((*_bodies_of(solid), b.name, "shape"), f"overlaps body '{a.name}' by {thickness:.6g} m")
+
+
+def _bodies_of(solid: Solid) -> Path:
+    """Where the input has them."""
+    return ("solid", "obstacles" if solid.obstacles else "bodies")
 
 
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
@@ -180,11 +216,15 @@ def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
     if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
         yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
-    if turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
+    if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
+        yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
+    elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):
         yield Fault((*path, "lattice_angle"), "needs packing = 'lattice', another shape than a half space, 2D or 3D")
     elif turned and _cut_off_axis(shape, domain):
         yield Fault((*path, "lattice_angle"), "a turned lattice has no symmetry planes; expected a whole body")
-    if body.radial_velocity and isinstance(shape, Box | HalfSpace):
+    if body.packing == "relaxed" and isinstance(shape, HalfSpace):
+        yield Fault((*path, "packing"), "a half space has no relaxed packing; expected 'lattice'")
+    if body.radial_velocity and not isinstance(shape, Ball | Tube | Cylinder):
         yield Fault((*path, "radial_velocity"), "needs a ball, tube or cylinder")
     if body.fixed_velocity and body.fixed is None:
         yield Fault((*path, "fixed_velocity"), "needs a `fixed` shape")
@@ -216,6 +256,8 @@ def _number_of_particles(body: Body, domain: Domain) -> float:
             extents = [2.0 * radius] * domain.dimensions
         case Cylinder(start, end, outer, inner):
             extents = [math.dist(start, end), outer - inner, math.pi * (outer + inner)]
+        case Cloud() as cloud:
+            return float(len(cloud.positions))
         case shape:
             lower, upper = bounding_box(shape)
             extents = list(np.minimum(upper, domain.upper) - np.maximum(lower, domain.lower))
@@ -231,7 +273,7 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
         slack = 1e-6 * body.spacing
         beyond = (lower[axis] < domain.lower[axis] - slack, upper[axis] > domain.upper[axis] + slack)
         for side in range(2):
-            if beyond[side] and ends[side] != "symmetry":
+            if beyond[side] and math.isfinite((lower, upper)[side][axis]) and ends[side] != "symmetry":
                 where = f"the {SIDES[side]} {AXES[axis]} end of the domain"
                 yield Fault(path, f"reaches beyond {where}, which is '{ends[side]}'; only 'symmetry' may cut a body")
 
@@ -245,13 +287,17 @@ def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fl
     coarsest = COARSEST_SPACING * min(domain.spacing)
     for body in solid.bodies:
         if body.spacing > coarsest:
-            path = ("solid", "bodies", body.name, "spacing")
+            path = (*_bodies_of(solid), body.name, "spacing")
             text = f"{body.spacing:.6g} m is too coarse for the fluid cells; expected at most {coarsest:.6g} m"
             yield Fault(path, f"{text}, {COARSEST_SPACING} of the smallest cell; half a cell is better")
 
 
 def check_output(given: OutputInput, present: Container[str], domain: Domain) -> Iterator[Fault]:
-    """Fields of the cells need cells."""
+    """Fields of the cells need cells; the stop file lies in the output directory."""
+    stop_file = stop_file_in(given.directory or "", given.stop_file)
+    if stop_file in ("", ".", "..") or {"/", "\0"} & set(stop_file) or len(stop_file.encode()) > LONGEST_NAME:
+        text = f"{given.stop_file[:LONGEST_NAME]!r}; expected the name of a file, which lies in the output directory"
+        yield Fault(("output", "stop_file"), text)
     for key in ("peaks", "schlieren"):
         if getattr(given, key) and "fluid" not in present:
             yield Fault(("output", key), "needs a fluid")

@@ -5,12 +5,19 @@ Vectors have one entry per dimension of the domain. Sides are (axis, 0 = low end
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn as AfterburnLaw
+from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -18,10 +25,10 @@ RiemannSolver = Literal["hllc", "hll", "rusanov", "adaptive"]
 Reconstruction = Literal["first_order", "minmod", "van_leer", "weno5"]
 TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
-Packing = Literal["lattice", "rings"]
+Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -70,7 +77,34 @@ class Cylinder:
     inner_radius: float
 
 
-Shape = Box | Ball | HalfSpace | Tube | Cylinder
+class Composed(ABC):
+    """A shape made of others, or read from a file. It brings its own geometry; that of the five above, of which it is
+    made, is in scene/shapes.py. Frozen and hashable."""
+
+    @property
+    @abstractmethod
+    def dimensions(self) -> int:
+        """Number of its coordinates."""
+
+    @property
+    @abstractmethod
+    def exact(self) -> bool:
+        """Whether `distance` is the true one, and not only a bound of it from below."""
+
+    @abstractmethod
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance [m] of `points` (n, D) to the surface, negative inside -> (n,): true, or nearer to zero."""
+
+    @abstractmethod
+    def support(self, normal: np.ndarray) -> float:
+        """How far the shape reaches along `normal` (D,) of length 1 [m]; for some a bound from above."""
+
+    @abstractmethod
+    def volume(self) -> float:
+        """Length, area or volume [m, m2, m3]."""
+
+
+Shape = Box | Ball | HalfSpace | Tube | Cylinder | Composed
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
@@ -107,6 +141,62 @@ class Region:
 
 
 @dataclass(frozen=True)
+class PointDetonator:
+    """Lights the explosive from `position` [m] after `delay` [s]."""
+
+    position: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineDetonator:
+    """Lights it from all points of the line from `start` to `end` [m] at once, after `delay` [s]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlaneDetonator:
+    """Lights it from all of the plane through `point` [m] at once, after `delay` [s]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    delay: float = 0.0
+
+
+Detonator = PointDetonator | LineDetonator | PlaneDetonator
+
+
+@dataclass(frozen=True)
+class Detonation:
+    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+
+    phase: int
+    burn: Burn
+    detonators: tuple[Detonator, ...]
+
+
+@dataclass(frozen=True)
+class Afterburn:
+    """How the products, a phase, burn with air."""
+
+    phase: int
+    law: AfterburnLaw
+
+
+@dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -119,6 +209,9 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    detonation: Detonation | None = None
+    afterburn: Afterburn | None = None
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -130,8 +223,8 @@ class Body:
 
     Particles inside `fixed` (if any) keep fixed_velocity [m/s]. To `velocity` comes radial_velocity [m/s], outward at
     the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
-    `packing` (None: what suits the shape): rings along the surface or a lattice, turned by lattice_angle [rad] about a
-    cylinder's axis or the z axis. `form` (None: that of the solid).
+    `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
+    cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
     """
 
     name: str
@@ -148,11 +241,14 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
+
+    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
@@ -167,6 +263,7 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
+    obstacles: bool = False
     friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm:
@@ -179,12 +276,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:
@@ -225,8 +323,8 @@ class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
     `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
-    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
-    is by a file called `stop_file`.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only at the end (`restart_at_end`)
+    and when the run is stopped, as it is by a file called `stop_file` in the directory.
     """
 
     directory: str
@@ -237,6 +335,7 @@ class Output:
     hdf5: Hdf5 = "mpi-io"
     restart_every: float = 0.0
     stop_file: str = "stop"
+    restart_at_end: bool = True
 
 
 @dataclass(frozen=True)

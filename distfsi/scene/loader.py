@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path as File
@@ -12,8 +12,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from distfsi.errors import InputError
-from distfsi.scene import build, checks, materials
-from distfsi.scene.description import Scene
+from distfsi.scene import build, charges, checks, materials
+from distfsi.scene.composed import meshes_in
+from distfsi.scene.description import Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
@@ -30,20 +31,36 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     text, data = _read(file)
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
+    uncharged, charged = charges.add_charges(data)
     unnamed, incomplete = materials.fill(data)
-    sections, invalid = validate(data)
+    sections, invalid = validate(data, str(file.parent))
     scene, crossed = _assemble(sections, data, file.stem)
-    faults += unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
+    faults += uncharged + unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:
         raise InputError(locations.tell(faults))
-    return replace(scene, notes=tuple(locations.tell(notes)))
+    return replace(scene, notes=tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)])))
 
 
 @cache
 def schema() -> dict[str, Any]:
     """JSON schema of the input, for editors."""
     return Input.model_json_schema()
+
+
+def _open_surfaces(scene: Scene) -> Iterator[Fault]:
+    """What to tell of surfaces that are not watertight."""
+    shapes: list[tuple[Path, Shape | None]] = []
+    for n, region in enumerate(scene.fluid.regions if scene.fluid else ()):
+        shapes.append((("fluid", "regions", n, "shape"), region.shape))
+    kind = "obstacles" if scene.solid and scene.solid.obstacles else "bodies"
+    for body in scene.solid.bodies if scene.solid else ():
+        shapes += [(("solid", kind, body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
+    for path, shape in shapes:
+        for mesh in meshes_in(shape):
+            if count := mesh.surface.open_edges:
+                text = f"'{mesh.file}' is not watertight: {count} edges do not have a triangle on each side"
+                yield Fault(path, f"{text}; what it winds around by more than a half is inside")
 
 
 def _read(file: File) -> tuple[str, dict[str, Any]]:
@@ -62,9 +79,10 @@ def _inside(path: Path, tables: Sequence[Path]) -> bool:
     return any(path[: len(table)] == table for table in tables)
 
 
-def validate(data: dict[str, Any]) -> tuple[Sections, list[Fault]]:
-    """The sections of `data` that are valid in themselves, and the faults of the others."""
-    context = context_of(data)
+def validate(data: dict[str, Any], folder: str) -> tuple[Sections, list[Fault]]:
+    """The sections of `data` that are valid in themselves, and the faults of the others. Names of files that `data`
+    holds count from `folder`."""
+    context = context_of(data, folder)
     try:
         return Input.model_validate(data, context=context), []
     except ValidationError as error:

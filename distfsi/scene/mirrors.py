@@ -1,12 +1,13 @@
-"""Tables of shapes; each mirrors a class of description.py and builds it."""
+"""Tables of shapes; each mirrors a class of description.py and builds it. Those made of others: composed_tables.py."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Union
 
 from pydantic import Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.values import (
     Direction,
     Length,
@@ -94,4 +95,6 @@ class Cylinder(Mirror):
         return self
 
 
-Shape = Annotated[Box | Ball | HalfSpace | Tube | Cylinder, Field(discriminator="kind")]
+Shape = Annotated[Union[(Box, Ball, HalfSpace, Tube, Cylinder, *TABLES)], Field(discriminator="kind")]  # noqa: UP007
+for table in TABLES:
+    table.model_rebuild(_types_namespace={"Shape": Shape})

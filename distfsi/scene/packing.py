@@ -7,8 +7,11 @@ import math
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Body, Box, Cylinder, HalfSpace, Tube
-from distfsi.scene.shapes import bounding_box, contains, cylinder_coordinates, volume
+from distfsi.scene.cloud import Cloud
+from distfsi.scene.composed import Intersection
+from distfsi.scene.description import Ball, Body, Box, Composed, Cylinder, HalfSpace, Tube
+from distfsi.scene.fitting import fits_by_itself, fitted
+from distfsi.scene.shapes import bounding_box, contains, cylinder_coordinates, is_its_bounding_box, volume
 
 
 def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -16,18 +19,37 @@ def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tupl
 
     A Box is cut to the domain and filled exactly; a Ball gets a lattice about its center, a HalfSpace one that fills
     the domain, a Tube (2D) and a Cylinder rings, unless the body asks for the other. Lattice and rings leave planes
-    through the center between particles.
+    through the center between particles. What is composed: scene/fitting.py.
     """
+    shape = body.shape
+    if isinstance(shape, Composed) and not isinstance(shape, Cloud) and is_its_bounding_box(shape):
+        shape = Box(*bounding_box(shape))
+    elif isinstance(shape, Composed) or body.packing == "relaxed":
+        return _composed(body, lower, upper)
     low_end, high_end = np.asarray(lower), np.asarray(upper)
-    match body.shape:
+    match shape:
         case Box(low, high) if body.lattice_angle == 0.0:
             positions, each = _fill(np.maximum(low, low_end), np.minimum(high, high_end), body.spacing)
             return positions, np.full(len(positions), each)
         case HalfSpace():
-            return _half_space(body.shape, low_end, high_end, body.spacing)
+            return _half_space(shape, low_end, high_end, body.spacing)
     positions, volumes = _in_rings(body) if uses_rings(body) else _in_lattice(body)
     inside = np.all((positions > low_end) & (positions < high_end), axis=1)
     return positions[inside], volumes[inside]
+
+
+def _composed(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Particles of a composed shape. Of one that the domain cuts, a lattice that knows only its surface ends there; any
+    other is cut between particles, and its volume is that of the part."""
+    whole, low, high = body.shape, *bounding_box(body.shape)
+    if all(a >= b for a, b in zip((*low, *upper), (*lower, *high), strict=True)):
+        return fitted(whole, body.spacing, body.packing)
+    part = Intersection((whole, Box(lower, upper)))
+    if not fits_by_itself(whole):
+        return fitted(part, body.spacing, body.packing)
+    positions, volumes = fitted(whole, body.spacing, body.packing)
+    inside = np.all((positions > np.asarray(lower)) & (positions < np.asarray(upper)), axis=1)
+    return positions[inside], volumes[inside] * (part.volume() / max(volumes[inside].sum(), 1e-300))
 
 
 def uses_rings(body: Body) -> bool:

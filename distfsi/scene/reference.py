@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
+from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.loader import schema
 
 Json = Mapping[str, Any]
@@ -45,13 +46,23 @@ SECTIONS = {
     "`[fluid]`": ("FluidInput",),
     "`[fluid.phases.NAME]`": ("NamedPhase", *_names(FluidEos)),
     "`[[fluid.regions]]`": ("RegionInput",),
+    "`[fluid.detonation]`": ("DetonationInput",),
+    "`burn` of the detonation": _names(Burn),
+    "`[[fluid.detonation.detonators]]`": ("PointDetonator", "LineDetonator", "PlaneDetonator"),
+    "`[[charges]]`": ("ChargeInput",),
+    "`[fluid.afterburn]`": ("AfterburnSectionInput",),
+    "`law` of the afterburn": _names(Afterburn),
+    "`[fluid.map]`": ("MapInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
+    "`[solid.obstacles.NAME]`": ("ObstacleInput",),
+    "`[solid.obstacles.NAME.motion]`": ("MotionInput",),
     "`eos` of a body": _names(SolidEos),
     "`strength` of a body": _names(Strength),
     "`failure` of a body": (*_names(Failure), "Scatter"),
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
+    "Shapes made of others, and from files": tuple(table.__name__ for table in TABLES),
     "`[sources.NAME]`": _names(Source),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
@@ -118,6 +129,8 @@ def _values(node: Json) -> str:
     for option in options:
         if "discriminator" in option:
             choice = option["discriminator"]
+            if "union" in choice["mapping"]:
+                return "table of a shape"
             return f"table with `{choice['propertyName']}` " + ", ".join(f'`"{word}"`' for word in choice["mapping"])
         if "unit" in option:
             limits = [f"{sign} {option[key]:g}" for key, sign in LIMITS.items() if key in option]
@@ -128,7 +141,9 @@ def _values(node: Json) -> str:
     types = {option.get("type") for option in options}
     if "boolean" in types:
         return "`true`, `false`" + (", table" if any("$ref" in option for option in options) else "")
-    return "text" if "string" in types else "list of tables" if "array" in types else "table"
+    if "array" in types:
+        return "list of vectors, " + items["unit"] if "unit" in (items := node.get("items", {})) else "list of tables"
+    return "text" if "string" in types else "table"
 
 
 if __name__ == "__main__":

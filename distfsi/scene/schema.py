@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
+from distfsi.scene.charges import ChargeInput
+from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
+from distfsi.scene.law_tables import (
+    FailureInput,
+    GaugeInput,
+    SolidEosInput,
+    SourceInput,
+    StrengthInput,
+    SymmetryWord,
+)
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
     Acceleration,
     Count,
     Density,
+    Direction,
     Length,
     PhaseName,
     Position,
@@ -44,6 +56,12 @@ class DomainInput(Table):
     x: Ends = OUTFLOW
     y: Ends = OUTFLOW
     z: Ends = OUTFLOW
+    symmetry: SymmetryWord = Field(
+        "planar",
+        description='what turns about an axis or a point: "axisymmetric" (2D): x is the distance r from an axis, y the '
+        'place z along it; "cylindrical", "spherical" (1D): x is the distance r from an axis or a point. Totals are of '
+        'the whole turn, in "cylindrical" per metre along the axis. The end at r = 0 has the kind "axis"',
+    )
     gravity: Acceleration | None = Field(None, description="acceleration of everything; default none")
 
 
@@ -105,6 +123,15 @@ class InflowInput(Table):
     z_high: StateInput | None = None
 
 
+class MapInput(Table):
+    """The end of another run, in radial coordinates, as the start of this one: over the first region, under the others.
+    Time goes on from there."""
+
+    run: str = Field(description="output directory of a finished run, or a restart file")
+    center: Position | None = Field(None, description="where its r = 0 (and z = 0) lies; default the origin")
+    axis: Literal["x", "y", "z"] = Field("z", description="3D: along which axis its own lies")
+
+
 class FluidInput(Table):
     """The compressible flow of one or two phases, numbered in order of appearance."""
 
@@ -112,6 +139,7 @@ class FluidInput(Table):
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    map: MapInput | None = Field(None, description="`[fluid.map]`: goes on from another run")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: description.Reconstruction = Field(
         "minmod", description="slopes of MUSCL, or curves through five cells; volume fractions then by van_leer"
@@ -123,6 +151,10 @@ class FluidInput(Table):
     model: description.TwoPhaseModel = Field(
         "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
     )
+    detonation: DetonationInput | None = Field(
+        None, description="how the explosive burns and what lights it; default: its regions are given burnt"
+    )
+    afterburn: AfterburnSectionInput | None = Field(None, description="how its products burn with air; default not")
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
     )
@@ -144,7 +176,7 @@ class BodyInput(Table):
     material: str | None = Field(
         None, description="name of a solid material (`distfsi materials`); the next keys change it"
     )
-    shape: Shape = Field(description="box, ball, half_space (cut to the domain), tube or cylinder")
+    shape: Shape = Field(description="what it fills; a half_space is cut to the domain")
     spacing: Length = Field(description="distance between particles; at most 0.75 of a fluid cell, better 0.5")
     density: Density = Field(description="density at rest")
     velocity: Velocity | None = Field(None, description="initial velocity; default at rest")
@@ -160,7 +192,9 @@ class BodyInput(Table):
         0.0, description="initial speed away from center or axis at the surface; hollow bodies: the inner one"
     )
     packing: description.Packing | None = Field(
-        None, description="lattice, or rings along the surface (tube in 2D, cylinder, ball in 2D); default what suits"
+        None,
+        description="lattice; rings along the surface (tube in 2D, cylinder, ball in 2D); or relaxed: particles that "
+        "pushed each other apart; default what suits",
     )
     lattice_angle: quantity("rad") = Field(
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
@@ -168,10 +202,45 @@ class BodyInput(Table):
     form: description.SolidForm | None = Field(None, description="as `form` of the solid, of this body alone")
 
 
-class SolidInput(Table):
-    """Solid bodies, computed with smoothed particles."""
+class MotionInput(Table):
+    """How an obstacle goes over time: a table, between whose rows speeds are constant; then it stands."""
 
-    bodies: dict[str, BodyInput] = Field(min_length=1, description="`[solid.bodies.NAME]`: the bodies")
+    times: tuple[quantity("s", ge=0.0), ...] = Field(min_length=2, description="times of the rows, the first 0")
+    displacements: tuple[Position, ...] | None = Field(None, description="how far it has gone then; default not at all")
+    angles: tuple[quantity("rad"), ...] | None = Field(None, description="how far it has turned; default not at all")
+    about: Position | None = Field(None, description="a point of the axis at the start; default the origin")
+    axis: Direction | None = Field(None, description="direction of the axis; 3D only, and needed there to turn")
+
+    @model_validator(mode="after")
+    def _whole(self) -> MotionInput:
+        rows = len(self.times)
+        if self.times[0] != 0.0 or any(a >= b for a, b in itertools.pairwise(self.times)):
+            raise ValueError("times must begin with 0 and grow")
+        for name in ("displacements", "angles"):
+            given = getattr(self, name)
+            if given is not None and len(given) != rows:
+                raise ValueError(f"{name} has {len(given)} rows, times {rows}")
+            if given is not None and np.any(np.asarray(given[0])):
+                raise ValueError(f"{name} must begin with 0: the shape is where the obstacle is at the start")
+        if self.axis is not None and not any(self.axis):
+            raise ValueError("axis must not be zero")
+        return self
+
+
+class ObstacleInput(Table):
+    """A rigid part that no force moves: it stands or goes as told, and costs no steps of particles."""
+
+    shape: Shape = Field(description="what it fills; a half_space is cut to the domain")
+    spacing: Length = Field(description="distance between the points of its wall; at most 0.75 of a cell, better 0.5")
+    packing: description.Packing | None = Field(None, description="as of a body")
+    motion: MotionInput | None = Field(None, description="how it goes; default it stands")
+
+
+class SolidInput(Table):
+    """Solid bodies, computed with smoothed particles; or obstacles."""
+
+    bodies: dict[str, BodyInput] = Field({}, description="`[solid.bodies.NAME]`: the bodies")
+    obstacles: dict[str, ObstacleInput] = Field({}, description="`[solid.obstacles.NAME]`: rigid parts")
     form: description.SolidForm = Field(
         "total_lagrangian",
         description="particles hold on to the neighbours they start with, by bonds that damage cuts, or act on those "
@@ -229,10 +298,13 @@ class OutputInput(Table):
         description='who writes: all ranks by MPI-IO, all ranks by an h5py with MPI ("mpio"), or rank 0 ("gather")',
     )
     restart_every: quantity("s", ge=0.0) = Field(
-        1800.0, description="computing time between restart files, of which two are kept; 0: only when stopped early"
+        1800.0, description="computing time between restart files, of which two are kept; 0: only at the end"
     )
-    stop_file: str | None = Field(
-        None, description="a file that, when it appears, stops the run early; default: stop in the output directory"
+    restart_at_end: bool = Field(
+        True, strict=True, description="write a restart file at the end, from which the run can be extended"
+    )
+    stop_file: str = Field(
+        "stop", description="a file in the output directory that, when it appears, stops the run early"
     )
 
 
@@ -278,6 +350,7 @@ class Sections(Table):
     domain: DomainInput | None = None
     time: TimeInput | None = None
     fluid: FluidInput | None = None
+    charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()
@@ -293,10 +366,12 @@ class Input(Sections):
     time: TimeInput
 
 
-def context_of(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What validation must know of the whole input `data`: its dimensions (None: not clear) and its phase names."""
+def context_of(data: Mapping[str, Any], folder: str) -> dict[str, Any]:
+    """What validation must know of the whole input `data`: its dimensions (None: not clear), its phase names, and the
+    folder from which the names of files count."""
     domain, fluid = data.get("domain"), data.get("fluid")
     cells = domain.get("cells") if isinstance(domain, dict) else None
     phases = fluid.get("phases") if isinstance(fluid, dict) else None
     dimensions = len(cells) if isinstance(cells, list) else 1 if isinstance(cells, int) else None
-    return {"dimensions": dimensions, "phases": tuple(phases) if isinstance(phases, dict) else ()}
+    names = tuple(phases) if isinstance(phases, dict) else ()
+    return {"dimensions": dimensions, "phases": names, "folder": folder}

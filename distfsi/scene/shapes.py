@@ -1,12 +1,19 @@
-"""Geometry of the shapes: which points lie inside, how large they are."""
+"""Geometry of the shapes: which points lie inside, how large they are.
+
+Shapes made of others bring their own: scene/composed.py, scene/surface.py, scene/cloud.py.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Shape, Tube
+from distfsi.scene.description import Ball, Box, Composed, Cylinder, HalfSpace, Shape, Tube
+
+ROUNDING = 1e-12
 
 
 def dimensions(shape: Shape) -> int:
@@ -14,26 +21,53 @@ def dimensions(shape: Shape) -> int:
     match shape:
         case Box(corner, _) | HalfSpace(corner, _) | Cylinder(corner):
             return len(corner)
+        case Composed():
+            return shape.dimensions
     return len(shape.center)
 
 
 def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     """Signed distance [m] of `points` (n, D) to the surface of `shape`, negative inside -> (n,).
 
-    Outside the edges of a Box or a Cylinder it is the largest of the distances to its faces.
+    It is the true one where `has_true_distance` says so, otherwise a bound: of the right sign, and nowhere farther from
+    zero.
     """
-    return surfaces(shape, points).max(axis=1)
+    match shape:
+        case Box(lower, upper):
+            return meet(*np.maximum(np.asarray(lower) - points, points - np.asarray(upper)).T)
+        case Ball(center, radius):
+            return _radius(points, center) - radius
+        case HalfSpace(point, normal):
+            return (points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal)
+        case Tube(center, inner, outer):
+            r = _radius(points, center)
+            return np.maximum(inner - r, r - outer)
+        case Cylinder(start, end, outer, inner):
+            along, r = cylinder_coordinates(shape, points)
+            ends = np.maximum(-along, along - math.dist(start, end))
+            return meet(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
+        case Composed():
+            return shape.distance(points)
+
+
+def meet(*distances: np.ndarray) -> np.ndarray:
+    """Signed distance to what several regions have in common whose surfaces stand upright on each other, from the
+    distances to each: beside an edge that to the edge."""
+    nearest = np.maximum.reduce(distances)
+    return np.where(nearest > 0.0, np.sqrt(sum(np.maximum(d, 0.0) ** 2 for d in distances)), nearest)
+
+
+def has_true_distance(shape: Shape) -> bool:
+    """Whether `distance` is the true one, and not a bound."""
+    return shape.exact if isinstance(shape, Composed) else True
 
 
 def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k)."""
+    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k); of
+    a composed one to its surface as a whole."""
     match shape:
         case Box(lower, upper):
             return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
-        case Ball(center, radius):
-            return (_radius(points, center) - radius)[:, None]
-        case HalfSpace(point, normal):
-            return ((points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal))[:, None]
         case Tube(center, inner, outer):
             r = _radius(points, center)
             return np.stack([inner - r, r - outer], axis=1)
@@ -41,6 +75,7 @@ def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
             along, r = cylinder_coordinates(shape, points)
             hole = [inner - r] if inner > 0.0 else []
             return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
+    return distance(shape, points)[:, None]
 
 
 def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,10 +113,31 @@ def bounding_box(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
                 (d,) = axes
                 (high if normal[d] > 0.0 else low)[d] = point[d]
             return tuple(low), tuple(high)
+        case Composed():
+            along = np.eye(shape.dimensions)
+            return tuple(-shape.support(-axis) for axis in along), tuple(shape.support(axis) for axis in along)
 
 
-def volume(shape: Box | Ball | Tube | Cylinder) -> float:
-    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3]."""
+def support(shape: Shape, normal: np.ndarray) -> float:
+    """How far `shape` reaches along `normal` (D,) of length 1 [m]: largest x . normal of its points, or a bound."""
+    match shape:
+        case Box(lower, upper):
+            return float(np.maximum(np.asarray(lower) * normal, np.asarray(upper) * normal).sum())
+        case Ball(center, radius) | Tube(center, _, radius):
+            return float(np.asarray(center) @ normal) + radius
+        case Cylinder(start, end, radius):
+            axis = (np.asarray(end) - np.asarray(start)) / math.dist(start, end)
+            ends = max(np.asarray(start) @ normal, np.asarray(end) @ normal)
+            return float(ends + radius * math.sqrt(max(1.0 - (axis @ normal) ** 2, 0.0)))
+        case HalfSpace(point, outward):
+            along = np.asarray(outward) / math.hypot(*outward)
+            return float(np.asarray(point) @ normal) if along @ normal > 1.0 - ROUNDING else math.inf
+        case Composed():
+            return shape.support(normal)
+
+
+def volume(shape: Shape) -> float:
+    """Length, area or volume of `shape` in its own number of dimensions [m, m2, m3], infinite of a HalfSpace."""
     ball = (2.0, math.pi, 4.0 / 3.0 * math.pi)
     match shape:
         case Box(lower, upper):
@@ -92,10 +148,38 @@ def volume(shape: Box | Ball | Tube | Cylinder) -> float:
             return ball[len(center) - 1] * (outer ** len(center) - inner ** len(center))
         case Cylinder(start, end, outer, inner):
             return math.pi * (outer**2 - inner**2) * math.dist(start, end)
+        case HalfSpace():
+            return math.inf
+        case Composed():
+            return shape.volume()
+
+
+def is_its_bounding_box(shape: Shape) -> bool:
+    """Whether `shape` fills its bounding box, up to rounding."""
+    match shape:
+        case Composed():
+            return _fills_its_bounding_box(shape)
+        case HalfSpace(_, normal):
+            return sum(n != 0.0 for n in normal) == 1
+        case Ball(center, _):
+            return len(center) == 1
+    return isinstance(shape, Box)
+
+
+@lru_cache(maxsize=256)
+def _fills_its_bounding_box(shape: Composed) -> bool:
+    lower, upper = (np.asarray(corner) for corner in bounding_box(shape))
+    extent = upper - lower
+    if not (np.all(np.isfinite(extent)) and np.all(extent > 0.0)):
+        return False
+    inner = np.array(list(itertools.product((1e-6, 1.0 - 1e-6), repeat=len(extent))))  # near its corners
+    if not contains(shape, lower + inner * extent).all():
+        return False
+    return abs(shape.volume() / math.prod(extent) - 1.0) < ROUNDING
 
 
 def smallest_extent(shape: Shape) -> float | None:
-    """Smallest extent of a shape [m]; None for a half space."""
+    """Smallest extent of a shape [m]; None for a half space and for what is composed."""
     match shape:
         case Box(lower, upper):
             return min(b - a for a, b in zip(lower, upper, strict=True))
@@ -112,12 +196,12 @@ def volume_within(shape: Shape, lower: tuple[float, ...], upper: tuple[float, ..
     """Exact length, area or volume [m, m2, m3] of what lies in the box from `lower` to `upper` [m].
 
     None where there is no short formula: ends of the box cut the shape, but neither through its center nor, if it is a
-    cylinder, through or across its axis.
+    cylinder, through or across its axis; or it is composed.
     """
-    if isinstance(shape, HalfSpace):
-        return None
     low, high = bounding_box(shape)
-    if isinstance(shape, Box):
+    if not np.all(np.isfinite((low, high))):
+        return None
+    if isinstance(shape, Box) or (isinstance(shape, Composed) and is_its_bounding_box(shape)):
         return math.prod(max(min(b, e) - max(a, s), 0.0) for a, b, s, e in zip(low, high, lower, upper, strict=True))
     part = 1.0
     for axis, (a, b, start, end) in enumerate(zip(low, high, lower, upper, strict=True)):
@@ -145,4 +229,6 @@ def _lies_along(shape: Shape, axis: int) -> bool:
 
 def _is_even(shape: Shape, axis: int) -> bool:
     """Whether its two halves along `axis` are alike."""
-    return not isinstance(shape, Cylinder) or shape.start[axis] == shape.end[axis]
+    if isinstance(shape, Cylinder):
+        return shape.start[axis] == shape.end[axis]
+    return not isinstance(shape, Composed)

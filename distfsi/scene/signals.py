@@ -183,7 +183,9 @@ def _step_rate(scene: Scene, layout: Layout | None) -> float:
 
 def _solid_rate(scene: Scene) -> float:
     """1/dt [1/s] of the body that needs the shortest steps; 0 without one."""
-    return max((solid_rate(scene, body) for body in scene.solid.bodies), default=0.0) if scene.solid else 0.0
+    if scene.solid is None or scene.solid.obstacles:
+        return 0.0
+    return max((solid_rate(scene, body) for body in scene.solid.bodies), default=0.0)
 
 
 def fluid_rate(scene: Scene, layout: Layout) -> float:

@@ -125,6 +125,14 @@ def to_si(value: object, unit: str) -> float:
     return number
 
 
+def length_factor(unit: str) -> Fraction:
+    """Metres in a `unit`. Raises ValueError when it is none of length."""
+    factor, dimension = parse_unit(unit)
+    if dimension != LENGTH:
+        raise ValueError(f"has the unit '{unit}', needs one of length")
+    return factor
+
+
 def _number_to_float(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("is no number; expected one" + ("" if unit == "1" else f' or a text such as "2.5 {unit}"'))

@@ -1,7 +1,7 @@
 """Kinds of values in an input: quantities with units, vectors, counts, names; and the tables that hold them.
 
-Validation gets a context {"dimensions": int | None, "phases": names}, taken from the raw input, so that vectors and
-names are checked where they stand.
+Validation gets a context {"dimensions": int | None, "phases": names, "folder": path}, taken from the raw input, so that
+vectors and names are checked where they stand.
 """
 
 from __future__ import annotations
@@ -78,6 +78,8 @@ Density = quantity("kg/m3", gt=0.0)
 Pressure = quantity("Pa")
 PositivePressure = quantity("Pa", gt=0.0)
 Temperature = quantity("K", ge=0.0)
+Mass = quantity("kg", gt=0.0)
+Delay = quantity("s", ge=0.0)
 Speed = quantity("m/s", gt=0.0)
 Position = vector("m")
 Velocity = vector("m/s")

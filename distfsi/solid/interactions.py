@@ -36,7 +36,7 @@ def form_of(
     return UpdatedLagrangian(kernels, device, search, sides, domain.dimensions, repels)
 
 
-def obstacles_of(
+def contacts_of(
     scene: Scene, kernels: SimpleNamespace, exchange: ParticleExchange, communicator: Communicator, sides: Sides
 ) -> list[Contact | Walls]:
     """What bodies run into: other sides, and walls of the domain."""

@@ -54,8 +54,8 @@ class SolidForm(Protocol):
 class Structure(Protocol):
     """What makes a wall: surface points with mass that are advanced, and that take an impulse of the fluid. The order
     of calls in a step (distfsi/step.py): prepare(), time_step() and advance() in each sub-step, apply_impulse(),
-    migrate(). Deformable particles (solid/solid.py) are the one kind there is. Arrays are the device's, of this rank's
-    `count` points.
+    migrate(). There are deformable particles (solid/solid.py) and obstacles (solid/obstacles.py). Arrays are the
+    device's, of this rank's `count` points.
 
     communicator  of all ranks
     columns    of the points: id, fixed, mass [kg], density [kg/m3], position [m], velocity [m/s]; where bonds hold
@@ -68,6 +68,7 @@ class Structure(Protocol):
     carried    (own, D) [m/s] mean velocity since then
     given      (local blocks, bodies, D) impulse [N s] that the fluid gave to each body in the last step, on the host
     work       (local blocks,) work [J] of that impulse, on the host
+    stands     whether no point ever moves
     """
 
     communicator: Communicator
@@ -80,6 +81,7 @@ class Structure(Protocol):
     carried: Any
     given: np.ndarray
     work: np.ndarray
+    stands: bool
 
     @property
     def count(self) -> int:

@@ -64,7 +64,7 @@ class CutCells:
     causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
             an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
             them, and has not)
-    geometry  of the last step; None before the first
+    geometry  of the last step; None before the first. That of a wall that stands is found once
     """
 
     causes = ("wall", "sides")
@@ -82,6 +82,7 @@ class CutCells:
         self._initial = InitialState(present(scene.fluid), model)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
+        self._settled = False
         self._wall_sums = np.zeros((blocks.local_count, model.conserved))
         # the kernels, and who uses them
         coarsest = max(body.spacing for body in present(scene.solid).bodies)
@@ -140,13 +141,18 @@ class CutCells:
 
     def time_step(self) -> float:
         """Longest step [s] in which no particle of this rank goes farther than LARGEST_MOVE."""
-        lowest, highest = self._rows.bounds(self._particles.velocity)
+        lowest, highest = (np.zeros(1),) * 2 if self.solid.stands else self._rows.bounds(self._particles.velocity)
         speed = max(-lowest.min(), highest.max())
         return LARGEST_MOVE * self._narrowest / max(speed, 1e-300)
 
     def update_geometry(self) -> CutGeometry:
         """Collective, after solid.advance(). Cut the cells where the particles are now, and find the moving wall. From
         then on the fluid's band holds contents, until merge()."""
+        if self._settled:
+            self.geometry = geometry = present(self.geometry).again(self.device)
+            states = self._redistribution.states(self.fluid.device_state)
+            self._redistribution.take_contents(geometry.lists.band, states)
+            return geometry
         start = self._particles.start
         # particles
         passage = self._wall_particles.find(start)
@@ -165,6 +171,7 @@ class CutCells:
         self.geometry = CutGeometry(
             motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
         )
+        self._settled = self.solid.stands and self._redistribution.is_settled(lists, rows, walls)
         return self.geometry
 
     def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
@@ -238,7 +245,7 @@ class CutCells:
         """Collective, after solid.apply_impulse(), whose impulse worked at the `excess` (own, D) [m/s] over the
         velocity of the wall: the fluid pays for it."""
         D, P, p = self._dimensions, self.model.phases, self._particles
-        states = self._redistribution.states(self.fluid.device_state)
+        states = None if self.solid.stands else self._redistribution.states(self.fluid.device_state)
         impulse, work = self._forces.correct(geometry, excess, transfer.shared, states)
         self._wall_sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
         self._wall_sums[:, -1] += p.work - work - transfer.dragged[:, -1]
@@ -335,6 +342,7 @@ class CutCells:
         self.wall.near.changed()
         position = self._particles.position
         self._wall_particles.cut(self._wall_particles.find(position), position, self._particles.velocity)
+        self._settled = False
 
     def budget_by_cause(self) -> dict[str, np.ndarray]:
         """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""

@@ -55,6 +55,8 @@ class WallForces:
         self._table = blocks.table_on(wall.device)
         self._transfer = array(blocks.allocate(1 + self._D))
         self._parity = array(np.append(1 << np.arange(self._D), 0))
+        self._motion: WallMotion | None = None  # for which the order of particles and their homes are
+        self._order = self._homes = wall.device.empty(0, np.int64)
         images = np.array(grid.ghosts)
         self._seen_cells = array(np.column_stack([-images, grid.cells + images]))
 
@@ -82,10 +84,15 @@ class WallForces:
         device.run(self._kernels.push_together, p.count, *moving, impulse, shared)
         return impulse, shared
 
-    def correct(self, geometry: CutGeometry, excess: Any, shared: Any, states: States) -> tuple[np.ndarray, np.ndarray]:
+    def correct(
+        self, geometry: CutGeometry, excess: Any, shared: Any, states: States | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Collective, after solid.apply_impulse(): the energy correction. The fluid pays for the velocity at which
-        impulses worked over that of the wall, `excess` (own, D) [m/s]; `shared` as of impulse_on(). Returns what it has
-        given in the step, impulse (local blocks, D) [N s] and work (local blocks,) [J]."""
+        impulses worked over that of the wall, `excess` (own, D) [m/s]; `shared` as of impulse_on(); states None: not,
+        the wall stands. Returns what it has given in the step, impulse (local blocks, D) [N s] and work (local blocks,)
+        [J]."""
+        if states is None:
+            return self.given(geometry)
         device, own, D, k = self._device, self._particles.count, self._D, self._kernels
         band, loads, n = geometry.band, geometry.loads, geometry.band.cells.shape[0]
         # what cells see of the gains
@@ -100,9 +107,14 @@ class WallForces:
         self._merging.ghosts.exchange((self._transfer, self._parity))
         known = (geometry.merging, correction, paid, states, self._grid)
         device.run(self._fluid_kernels.correct_energy, n, band.cells, *known)
-        given = (loads.impulse, loads.work, paid)
-        impulse, work, extra = (self._cell_volume * geometry.lists.blocks.sums(amounts) for amounts in given)
-        return impulse, work[:, 0] + extra[:, 0]
+        impulse, work = self.given(geometry)
+        return impulse, work + self._cell_volume * geometry.lists.blocks.sums(paid)[:, 0]
+
+    def given(self, geometry: CutGeometry) -> tuple[np.ndarray, np.ndarray]:
+        """What the fluid has given to the wall in the stages: impulse (local blocks, D) [N s], work (local blocks,)
+        [J]."""
+        sums, loads = geometry.lists.blocks.sums, geometry.loads
+        return self._cell_volume * sums(loads.impulse), self._cell_volume * sums(loads.work)[:, 0]
 
     def pressures(self, geometry: CutGeometry) -> Any:
         """Mean pressure times the time [Pa s] on the wall in each cell of the band, (n,) on the device."""
@@ -126,9 +138,12 @@ class WallForces:
         its own."""
         own, wall, device, k = self._particles.count, self._wall, self._device, self._kernels
         middle = motion.passage.own_middle
-        gained, home = device.empty((own, 1 + self._D)), device.empty(own, np.int64)
-        chosen = wall.coarse_order(middle, self._particles.id_on_device)
-        device.run(k.find_homes, own, self._particles.start, home, self._grid, self._table)
+        gained = device.empty((own, 1 + self._D))
+        if motion is not self._motion:  # that of a wall that stands remains
+            self._motion, self._homes = motion, device.empty(own, np.int64)
+            self._order = wall.coarse_order(middle, self._particles.id_on_device)
+            device.run(k.find_homes, own, self._particles.start, self._homes, self._grid, self._table)
+        chosen, home = self._order, self._homes
         given = (wall.seen, self._merging.mark, BAND, self._transfer, self._seen_cells)
         receivers = Receivers(middle, home, motion.image)
         device.run(k.spread, -(-own // wall.lanes), chosen, receivers, *given, gained, self._grid)

@@ -52,6 +52,7 @@ class Redistribution:
         device, blocks = wall.device, wall.blocks
         self._model, self._device, self._grid, self._merging = model, device, wall.grid, merging
         self._rows, self._kernels, self._rest = rows, kernels, device.array(rest)
+        self._communicator = blocks.communicator
         self.fields = VOLUME_FIELDS if model.phases == 2 else 1
         self.volume = DualArray(device, np.ones((blocks.local_count, self.fields, *blocks.shape), rest.dtype))
         mirrors = (model.mirror, np.full(self.fields, -1))
@@ -81,6 +82,13 @@ class Redistribution:
         mark = self._device.empty(band.shape[0], np.int8)
         self._device.run(self._kernels.mark_absorbed, band.shape[0], band, mark, kind, self._merging.target, self._grid)
         return self._rows.any(mark)
+
+    def is_settled(self, lists: CellLists, lone: Any, walls: Walls) -> bool:
+        """Collective. Whether a wall that stands leaves nothing to find again: no cells without all their fluid, no
+        isolated ones with receivers, no `lone` particles."""
+        absorbed = self.any_absorbed(lists.band, walls.kind)
+        left = np.array([float(lists.uneven.shape[0]), float(lone.shape[0]), float(absorbed)])
+        return not self._communicator.maximum(left).any()
 
     def absorb(self, band: Any, contents: Contents, walls: Walls) -> None:
         """Collective. Contents of isolated cells move to their receivers."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from distfsi.coupling.cut_cells.kernels.records import Band, Contents, Merging, States, WallLoads, Walls
+from distfsi.device.interface import Device
 from distfsi.mesh.kernels.search import Bins
 from distfsi.mesh.particles import GhostPlan
 from distfsi.mesh.rows import Groups
@@ -119,6 +120,12 @@ class CutGeometry:
     loads: WallLoads
     start_volume: Any
     expands: bool
+
+    def again(self, device: Device) -> CutGeometry:
+        """That of the next step where the wall stands: what the fluid gives to it begins anew."""
+        loads = self.loads
+        fresh = (device.zeros(array.shape) for array in (loads.impulse, loads.work, loads.added))
+        return replace(self, loads=WallLoads(loads.velocity, loads.inertia, *fresh))
 
 
 @dataclass(frozen=True)
