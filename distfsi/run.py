@@ -36,6 +36,7 @@ from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import Restart, find_restart
 from distfsi.output.storage import on_root, storage
 from distfsi.scene.description import Scene
+from distfsi.scene.warnings import warnings
 from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.step import parts_of
 
@@ -106,6 +107,9 @@ def run(
     progress = Progress(scene.time.end, communicator)
     for note in scene.notes:
         progress.say(note)
+    if communicator.rank == 0:
+        for text in warnings(scene):
+            progress.say(f"warning: {text}")
     threads = threads or threads_of_rank(communicator)
     device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None

@@ -92,6 +92,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         _detonation(given.detonation, phases) if given.detonation else None,
         Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
         _map(given.map, dimensions) if given.map else None,
+        given.hydrostatic_level,
     )
 
 

@@ -198,7 +198,11 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`."""
+    """The compressible flow. One phase: Euler; two: `model`.
+
+    hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
+    regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
+    """
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
@@ -212,6 +216,7 @@ class Fluid:
     detonation: Detonation | None = None
     afterburn: Afterburn | None = None
     map: Map | None = None
+    hydrostatic_level: float | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------

@@ -139,6 +139,11 @@ class FluidInput(Table):
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    hydrostatic_level: quantity("m") | None = Field(
+        None,
+        description="coordinate along gravity where the pressure of the first region holds: regions with that pressure "
+        "then are at rest, their pressures growing along gravity, their densities along isentropes; default: as given",
+    )
     map: MapInput | None = Field(None, description="`[fluid.map]`: goes on from another run")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: description.Reconstruction = Field(

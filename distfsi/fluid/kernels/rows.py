@@ -28,12 +28,14 @@ from distfsi.formulas.symbols import (
     FLUXES,
     FRACTIONAL,
     GHOSTS,
+    HYDROSTATIC,
     PHASES,
     RADIAL,
     SHARPENED,
     TRANSVERSE_SENSOR,
     VARIABLES,
     before_relaxation,
+    beyond_rest,
     face_flux,
     fraction_after,
     halved_range,
@@ -71,15 +73,41 @@ def low_increment(v):
     return v + VARIABLES if ASYMMETRIC else v
 
 
+@helper
+def density_at(P, c, sp):
+    """[kg/m3] of the cell P[c]; variables are sp apart."""
+    if PHASES == 1:
+        return load(P, c)
+    else:
+        a1 = load(P, c + (PHASES + DIMENSIONS + 1) * sp)
+        return a1 * load(P, c) + (1.0 - a1) * load(P, c + sp)
+
+
+@helper
+def pressure_increments(P, c, sp, step, fall):
+    """Increments of the pressure in a cell whose first variable is at P[c]: beside the weight of fluid at rest, with
+    g h along the row, and that weight."""
+    pressure = (PHASES + DIMENSIONS) * sp
+    p = tuple(load(P, c + pressure + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
+    rho = tuple(density_at(P, c + k * step, sp) for k in static_range(1 - GHOSTS, GHOSTS))
+    low, high = reconstructed(beyond_rest(p, rho, fall))
+    weight = 0.5 * fall * rho[GHOSTS - 1]
+    return (low + weight, high + weight)
+
+
 @row
-def increments_row(P, T, p, sp, step, t, st, n):
+def increments_row(P, T, p, sp, step, t, st, n, fall):
     """T[t …] = increments of the primitives of the n cells at P[p …] from the mean to the high face along the axis
-    whose cells are `step` apart, then where they differ those from the low face to the mean."""
+    whose cells are `step` apart, then where they differ those from the low face to the mean; `fall`: g h of a body
+    force along that axis, if there is one."""
     for v in static_range(VARIABLES):
         for i in range(n):
             c = p + v * sp + i
             cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
-            low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
+            if HYDROSTATIC and v == PHASES + DIMENSIONS:
+                low, high = pressure_increments(P, p + i, sp, step, fall)
+            else:
+                low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
             store(T, t + v * st + i, high)
             if ASYMMETRIC:
                 store(T, t + low_increment(v) * st + i, low)
