@@ -27,6 +27,10 @@ class StepFailed(Diverged):
     """No attempt at a step has left a valid state; the state before the step is still there."""
 
 
+class StepTooShort(Diverged):
+    """The time step has fallen below what the scene allows; the state before the step is valid."""
+
+
 class OutputError(DistfsiError):
     """Results could not be written; the message names the file, the cause and the space left. Raised on every rank."""
 

@@ -20,7 +20,7 @@ from distfsi.diagnostics.derived import DerivedFields
 from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks
 from distfsi.diagnostics.schlieren import Schlieren
-from distfsi.errors import Diverged, StepFailed
+from distfsi.errors import Diverged, StepFailed, StepTooShort
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -52,6 +52,7 @@ class Simulation:
               `snapshot()` and `restore(snapshot)`
     derived   fields of the cells for the output files, beside those of the fluid
     last_step the step made last
+    first_step  the longest stable step [s] at the start
     named     what set steps, with the cell or particle, as it was named last
     loaded    whether the fluid has pressed on the solid by more than the scene's limit
     alone     whether by less since, so that it was dropped, and the solid goes on alone
@@ -70,6 +71,7 @@ class Simulation:
     time: float = 0.0
     steps: int = 0
     last_step: TimeStep = TimeStep()
+    first_step: float = 0.0
     named: dict[Reason, str] = field(default_factory=dict)
     loaded: bool = False
     alone: bool = False
@@ -117,6 +119,8 @@ class Simulation:
         """Advance everything by one step."""
         try:
             made = self._advance()
+        except StepTooShort:
+            raise
         except Diverged as error:
             faults = self._faults() or [f"{error} at t = {self.time:.6g} s, after {self.steps} steps"]
             if isinstance(error, StepFailed):
@@ -137,7 +141,19 @@ class Simulation:
         """Plan a step and make it."""
         fluid, solid, coupling = self._active
         find_forces(solid, coupling, self.timers)
-        return make_step(fluid, solid, coupling, self.time_step(), self.timers)
+        planned = self.time_step()
+        self._refuse_short(planned)
+        return make_step(fluid, solid, coupling, planned, self.timers)
+
+    def _refuse_short(self, planned: TimeStep) -> None:
+        """Collective. Raise StepTooShort where a step is planned that would never get to the end of the run."""
+        self.first_step = self.first_step or planned.stable
+        smallest = self.scene.time.smallest_step
+        if planned.reason is not Reason.END and planned.stable < smallest * self.first_step:
+            cause = planned.name_reason(self.fluid, self.communicator)
+            when = f"at t = {self.time:.6g} s, after {self.steps} steps"
+            limit = f"less than {smallest:g} of the first, {self.first_step:.3g} s (time.smallest_step)"
+            raise StepTooShort(f"the stable time step is {planned.stable:.3g} s {when}, {limit}: {cause}")
 
     def time_step(self) -> TimeStep:
         """Collective. The longest step that all parts on all ranks can take now. Raises Diverged."""
@@ -213,13 +229,14 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """What a restart needs besides the parts."""
-        names = ("time", "steps", "loaded", "alone")
+        names = ("time", "steps", "first_step", "loaded", "alone")
         return {"values": {name: np.array(getattr(self, name)) for name in names}}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         values = snapshot["values"]
         self.time, self.steps = float(values["time"]), int(values["steps"])
+        self.first_step = float(values["first_step"])
         self.loaded, self.alone = bool(values["loaded"]), bool(values["alone"])
 
     @property

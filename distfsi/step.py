@@ -50,6 +50,7 @@ class TimeStep:
     """A step in time: one that is planned, or one that has been made. By default the one before the first.
 
     dt         [s]
+    stable     the longest stable one [s]; dt is shorter at the end of the run, and where it did not go as planned
     sub_steps  in how many equal parts a coupled solid takes it
     start      when it begins [s]
     request    the strongest of what all ranks were asked for when it was planned
@@ -58,6 +59,7 @@ class TimeStep:
     """
 
     dt: float = 0.0
+    stable: float = 0.0
     sub_steps: int = 0
     start: float = 0.0
     reason: Reason = Reason.START
@@ -112,12 +114,13 @@ def time_step(
     maximum = coupling.sub_steps if coupling else 1
     rate_of = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / maximum}
     reason = max(rate_of, key=rate_of.__getitem__)
-    dt, left = 1.0 / rate_of[reason], limits.end - time
-    if dt >= left:
-        dt, reason = left, Reason.END
+    stable, left = 1.0 / rate_of[reason], limits.end - time
+    dt = min(stable, left)
+    reason = reason if stable < left else Reason.END
     sub_steps = max(1, math.ceil(dt * solid_rate * (1.0 - 1e-12)))
     signals = fluid.signals.copy() if fluid else None
-    return TimeStep(dt, sub_steps, time, reason, Request(int(strongest)), signals, (1.0 / particle_dt, particle))
+    limit, request = (1.0 / particle_dt, particle), Request(int(strongest))
+    return TimeStep(dt, stable, sub_steps, time, reason, request, signals, limit)
 
 
 def find_forces(solid: Structure | None, coupling: Coupling | None, timers: Timers) -> None:

@@ -45,9 +45,10 @@ def solid(
     communicator=None,
     smoothing=1.3,
     artificial_stress=0.0,
+    friction=0.0,
 ):
     """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
-    D = len(lower)
+    D, given = len(lower), {"form": form, "artificial_stress": artificial_stress, "friction": friction}
     kinds = tuple(("symmetry" if axis in symmetric else "outflow", "outflow") for axis in range(D))
     scene = d.Scene(
         title="test",
@@ -55,7 +56,7 @@ def solid(
         time=d.Time(1.0, 0.5, None),
         sources=sources,
         fluid=None,
-        solid=d.Solid(tuple(bodies), smoothing, *viscosity, form=form, artificial_stress=artificial_stress),
+        solid=d.Solid(tuple(bodies), smoothing, *viscosity, **given),
         output=d.Output("", 0.0, 1),
         performance=d.Performance((block_cells,) * D, (block_cells,) * D),
     )

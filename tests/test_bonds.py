@@ -69,7 +69,7 @@ def test_the_time_step_follows_the_most_compressed_particle():
     dt, reason = part.time_step()
     stretches = np.linalg.svd(c["deformation"].reshape(-1, 2, 2), compute_uv=False)[:, -1]
     shortest = int(np.argmin(stretches))
-    assert reason == f"sound of solid particle {c['id'][shortest]}"
+    assert reason.startswith(f"sound of solid particle {c['id'][shortest]} of body 'body' at (")
     assert stretches[shortest] < 0.8
     assert dt == pytest.approx(stretches[shortest] * whole, rel=0.2)  # denser rubber is slower
 
@@ -535,9 +535,10 @@ def test_a_bar_bounces_from_its_mirror_image():
     bar = body(Box((0.3, 0.0), (0.7, 0.2)), 0.05, 1000.0, (-5.0, 0.0), RUBBER_EOS, RUBBER)
     part = total_lagrangian([bar], (0.0, -1.0), (2.0, 1.0), (0,))
     before, closest = energy(part), math.inf
+    middle = np.abs(part.columns["position"][:, 1] - 0.1) < 0.05  # corners see less of their image
     for _ in range(300):
         step(part)
-        closest = min(closest, part.columns["position"][:, 0].min())
+        closest = min(closest, part.columns["position"][middle, 0].min())
     totals = part.totals()
     assert 0.8 * 0.025 < closest < 0.025
     assert totals["momentum"][0] > 0.7 * totals["mass"] * 5.0

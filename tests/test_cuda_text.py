@@ -21,7 +21,7 @@ from distfsi.coupling.kernels import spreading
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs
+from distfsi.solid.kernels import bonds, contact, cracks, neighbours, pairs, self_contact, walls
 from launch import ROOT
 from side_by_side import SideBySide
 
@@ -29,7 +29,8 @@ ANY_ORDER = ("fill_cells",)  # of the particles in a cell, before order_cells
 # Where particles fail, as none does in these scenes: the ball of test_gpu.py that bursts reaches them.
 FAILING = ("find_cracks", "cut_bonds", "spread_damage", "mark_damaged", "mark_cut", "mark_unbonded", "open_voids")
 NOT_REACHED = (*FAILING, "accept_fit", "scatter_neighbours", "carry_unbonded", "keep_rates")
-FORMS = {"updated_lagrangian": (neighbours, pairs), "total_lagrangian": (bonds, cracks, contact)}
+FORMS = {"updated_lagrangian": (contact, neighbours, pairs, walls)}
+FORMS["total_lagrangian"] = (bonds, contact, cracks, self_contact, walls)
 CUT_CELLS = (band, fluxes, forces, fractions, images, inflation, lone, merging, nodal_distance, particles)
 CUT_CELLS += (redistribution, spreading, volumes)
 SCHEMES = {"immersed_boundary": (covering, spreading, states), "cut_cells": CUT_CELLS}
@@ -64,7 +65,7 @@ def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, s
     path.write_text(
         f"""
 coupling = {{ scheme = "{scheme}"{", drop_below = 1" if scheme != "immersed_boundary" else ""} }}
-domain = {{ lower = {[0] * D}, upper = {["16 mm"] * D}, cells = {[16] * D}, x = ["symmetry", "outflow"] }}
+domain = {{ lower = {[0] * D}, upper = {["16 mm"] * D}, cells = {[16] * D}, x = ["symmetry", "wall"] }}
 time = {{ end = "1 ms" }}
 performance = {{ block_cells = {[8] * D}, tile_cells = {[8, 4, 4][:D]} }}
 output = {{ peaks = true }}
@@ -78,6 +79,7 @@ density = 1000
 pressure = "2 GPa"
 [solid]
 form = "{form}"
+friction = 0.3
 {"artificial_stress = 0.3" if D == 3 and form == "updated_lagrangian" else ""}
 [solid.bodies.ball]
 shape = {{ kind = "ball", center = {["8 mm"] * D}, radius = "5 mm" }}

@@ -298,7 +298,9 @@ def test_the_last_valid_state_is_kept(undisturbed, tmp_path, monkeypatch):
         simulation.solid.columns["sound_speed"][simulation.solid.columns["id"] == 17] = np.nan
 
     before_step(monkeypatch, 30, spoil)
-    with pytest.raises(Diverged, match=r"(?s)solid particle 17 has no valid state at t = .*restart-00000029.h5$"):
+    with pytest.raises(
+        Diverged, match=r"(?s)solid particle 17 of body .* has no valid state at t = .*restart-00000029.h5$"
+    ):
         run_here(tmp_path, "output.restart_every=1 ns")
     assert series(tmp_path, "particles")[-1][0] == Restart(tmp_path / "restart-00000029.h5").time
     monkeypatch.undo()

@@ -420,10 +420,10 @@ def test_faults_between_fluid_and_solid(overrides, expected):
 
 def test_overlapping_bodies_are_a_fault():
     impact = ROOT / "inputs" / "plate_impact.toml"
-    for lower in ("-1 mm", "-0.03 mm"):  # deep inside the other plate; closer than two particles can be
+    for lower, depth in (("-1 mm", "0.001 m"), ("-0.03 mm", "3e-05 m")):
         with pytest.raises(InputError) as caught:
             load(impact, [f"solid.bodies.right.shape.lower={lower}"])
-        assert ": overlaps body 'left'" in str(caught.value)
+        assert f": overlaps body 'left' by {depth}" in str(caught.value)
     assert load(impact, ["solid.bodies.right.shape.lower=0.01 mm"])
 
 

@@ -27,7 +27,7 @@ from distfsi.output.storage import Piece, Storage, create_dataset, on_root, writ
 FORMAT = 2
 KEPT = 2  # restart files in an output directory
 # What may change at a restart: as it likes, or so that the user is told.
-FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit")
+FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit", "time.smallest_step")
 REPORTED = ("time.end", "time.maximum_steps", "time.cfl")
 
 Snapshot = Mapping[str, Mapping[str, np.ndarray]]

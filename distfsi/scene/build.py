@@ -53,7 +53,7 @@ def build_domain(given: DomainInput) -> Domain:
 
 def build_time(given: TimeInput) -> Time:
     """End and step size."""
-    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme)
+    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme, given.smallest_step)
 
 
 def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
@@ -115,7 +115,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    rest = (given.zero_energy, given.artificial_stress, bool(rigid))
+    rest = (given.zero_energy, given.artificial_stress, given.friction, bool(rigid))
     return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
 
 

@@ -29,6 +29,7 @@ from distfsi.scene.description import (
 )
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.law_tables import GaugeInput
+from distfsi.scene.overlaps import overlap
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     CouplingInput,
@@ -38,13 +39,13 @@ from distfsi.scene.schema import (
     PerformanceInput,
     Sections,
 )
-from distfsi.scene.shapes import bounding_box, contains
+from distfsi.scene.shapes import bounding_box
 from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
-CLOSEST_BODIES = 0.7  # of the mean spacing: particles of bodies that touch are about one spacing apart
+TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
 
 def check(
@@ -191,8 +192,10 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
         else:
             packed.append((body, positions))
     for first, second in itertools.combinations(packed, 2):
-        if _overlap(first, second):
-            yield Fault((*_bodies_of(solid), second[0].name, "shape"), f"overlaps body '{first[0].name}'")
+        (a, points_of_a), (b, points_of_b) = first, second
+        points, spacings = np.concatenate([points_of_a, points_of_b]), (a.spacing, b.spacing)
+        if (thickness := overlap(a.shape, b.shape, points, max(spacings))) > TOUCHING * min(spacings):
+            yield Fault((*_bodies_of(solid), b.name, "shape"), f"overlaps body '{a.name}' by {thickness:.6g} m")
 
 
 def _bodies_of(solid: Solid) -> Path:
@@ -266,16 +269,6 @@ def _check_extent(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
             if beyond[side] and math.isfinite((lower, upper)[side][axis]) and ends[side] != "symmetry":
                 where = f"the {SIDES[side]} {AXES[axis]} end of the domain"
                 yield Fault(path, f"reaches beyond {where}, which is '{ends[side]}'; only 'symmetry' may cut a body")
-
-
-def _overlap(first: tuple[Body, np.ndarray], second: tuple[Body, np.ndarray]) -> bool:
-    from scipy.spatial import cKDTree
-
-    (a, points_of_a), (b, points_of_b) = first, second
-    if contains(a.shape, points_of_b).any() or contains(b.shape, points_of_a).any():
-        return True
-    gap, _ = cKDTree(points_of_a).query(points_of_b)
-    return gap.min() < CLOSEST_BODIES * 0.5 * (a.spacing + b.spacing)
 
 
 def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fluid) -> Iterator[Fault]:

@@ -60,6 +60,9 @@ class TimeInput(Table):
     wall_clock_limit: quantity("s", gt=0.0) | None = Field(
         None, description="computing time after which the run stops early with a restart file, exit code 75"
     )
+    smallest_step: quantity("1", gt=0.0, lt=1.0) = Field(
+        1e-3, description="the run ends, exit code 3, where the stable step is below this part of the first one"
+    )
 
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
@@ -225,6 +228,7 @@ class SolidInput(Table):
         description="of the updated Lagrangian form: share of the tension with which close particles push each other "
         "away, against clumping; 0.3 is usual, 0 is none",
     )
+    friction: quantity("1", ge=0.0, le=2.0) = Field(0.0, description="Coulomb's coefficient between bodies that meet")
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

@@ -32,22 +32,30 @@ def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     It is the true one where `has_true_distance` says so, otherwise a bound: of the right sign, and nowhere farther from
     zero.
     """
+    if isinstance(shape, Box | Cylinder):
+        return meet(*surfaces(shape, points).T)
+    return surfaces(shape, points).max(axis=1)
+
+
+def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k). A
+    composed one counts as one."""
     match shape:
         case Box(lower, upper):
-            return meet(*np.maximum(np.asarray(lower) - points, points - np.asarray(upper)).T)
+            return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
         case Ball(center, radius):
-            return _radius(points, center) - radius
+            return (_radius(points, center) - radius)[:, None]
         case HalfSpace(point, normal):
-            return (points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal)
+            return ((points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal))[:, None]
         case Tube(center, inner, outer):
             r = _radius(points, center)
-            return np.maximum(inner - r, r - outer)
+            return np.stack([inner - r, r - outer], axis=1)
         case Cylinder(start, end, outer, inner):
             along, r = cylinder_coordinates(shape, points)
-            ends = np.maximum(-along, along - math.dist(start, end))
-            return meet(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
+            hole = [inner - r] if inner > 0.0 else []
+            return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
         case Composed():
-            return shape.distance(points)
+            return shape.distance(points)[:, None]
 
 
 def meet(*distances: np.ndarray) -> np.ndarray:

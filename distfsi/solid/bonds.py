@@ -21,9 +21,9 @@ from distfsi.scene.description import Solid
 from distfsi.solid.kernels import bonds as kernels
 from distfsi.solid.kernels.records import NEVER_BONDED, Bodies, Bonds, Fit, Particles
 from distfsi.solid.neighbours import NeighbourSearch
+from distfsi.solid.sides import Sides
 
 DRIVERS = (kernels.find_partners, kernels.weigh_bonds, kernels.fit_bonds, kernels.accept_fit)
-ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
 AT_A_TIME = 16384  # particles whose bonds are made together
 NONE = np.iinfo(np.int64).max  # no key
 
@@ -38,7 +38,6 @@ class BondNetwork:
 
     support    how far bonds reach in the reference state [m]
     bodies     spacing and smoothing length of the bodies, on the device
-    continued  (bodies,) the axes, as bits, along which a body goes on behind a symmetry plane, on the device
     """
 
     def __init__(
@@ -48,16 +47,16 @@ class BondNetwork:
         search: NeighbourSearch,
         communicator: Communicator,
         scene: Solid,
+        sides: Sides,
     ):
         """The bodies of the `scene` whose form is not the total Lagrangian one get no bonds."""
         device, spacing = exchange.device, np.array([body.spacing for body in scene.bodies])
         self._bonded = np.array([scene.form_of(body) == "total_lagrangian" for body in scene.bodies])
         self._kernels, self._rows, self._device = kernels, exchange.rows, device
-        self._search, self._communicator, self._spacing = search, communicator, spacing
+        self._search, self._communicator, self._sides = search, communicator, sides
         self._dimensions = exchange.blocks.grid.dimensions
         self.support = 2.0 * scene.smoothing * spacing.max()
         self.bodies = Bodies(device.array(spacing), device.array(scene.smoothing * spacing))
-        self.continued = device.zeros(len(spacing), np.int64)
         self._ids: np.ndarray | None = None  # for whose columns the requested keys are
         self._requested = np.empty(0, dtype=np.int64)
         self._key: Key | None = None  # for whose particles the partners and the geometry are
@@ -87,30 +86,16 @@ class BondNetwork:
     def _neighbours(
         self, c: Columns, exchange: ParticleExchange
     ) -> tuple[GhostPlan, np.ndarray, np.ndarray, np.ndarray]:
-        """Who is near whom, at the moment: a plan, the body (count,) of all particles, another one for images behind
-        planes at which it ends, table and number of neighbours."""
+        """Who is near whom, at the moment: a plan, the side (count,) of all particles, table and number of
+        neighbours."""
         device = self._device
         (own_position,) = c.read("position")
         plan = exchange.ghosts(own_position, c["id"], self.support)
         state = device.array(np.column_stack([c["mass"], c["density"], c["h"]]))
-        body = device.array(c["body"].astype(float))
-        given: list[tuple[Any, Any]] = [(own_position, "position"), (state, ((),) * 3), (body, ((),))]
-        position, state, body = plan.exchange(given)
+        position, state = plan.exchange([(own_position, "position"), (state, ((),) * 3)])
         found = self._search.find(plan.own, Particles(position, state), plan.key.device, self.support)
-        table, count, body = (device.download(array) for array in (*found, body))
-        continued = self._through_planes(c, exchange)
-        self.continued, body = device.array(continued), body.astype(np.int64)
-        side = body + len(continued) * (plan.key.host % IMAGES & ~continued[body] > 0)
-        return plan, side, table, count
-
-    def _through_planes(self, c: Columns, exchange: ParticleExchange) -> np.ndarray:
-        """(bodies,) the axes, as bits, along which a body goes on behind a symmetry plane."""
-        touching = np.zeros((len(self._spacing), self._dimensions))
-        for axis, plane in exchange.planes():
-            close = np.abs(c["position"][:, axis] - plane) < ON_THE_PLANE * self._spacing[c["body"]]
-            touching[c["body"][close], axis] = 1.0
-        touching = self._communicator.maximum(touching.ravel()).reshape(touching.shape)
-        return (touching.astype(np.int64) << np.arange(self._dimensions)).sum(axis=1)
+        table, count = (device.download(array) for array in found)
+        return plan, self._sides.of(plan.key).host(), table, count
 
     # ---- where the partners are --------------------------------------------------------------------------------------
 

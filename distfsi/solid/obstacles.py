@@ -64,10 +64,8 @@ class Obstacles(Solid):
         self._time = 0.0
         super().__init__(scene, *parts)
 
-    def _form(self, scene: Scene) -> NoForces:
-        return NoForces()
-
-    def _begin(self) -> None:
+    def _begin(self, scene: Scene) -> None:
+        self.form = NoForces()
         self.columns["fixed"] = np.ones(self.count, dtype=bool)
         if not self.stands:
             self.columns[REFERENCE] = self.columns["position"].copy()

@@ -37,7 +37,7 @@ class SolidForm(Protocol):
         parities, or "position". It comes back, of `count` particles, in `Near.payload`."""
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any, /) -> None:
-        """Collective. Add the `acceleration` (own, D) [m/s2] of the forces between particles to none, and write the
+        """Collective. Add to the `acceleration` (own, D) [m/s2] that of the forces between particles, and write the
         time steps (own, 2) [s] that they allow: by the speed of sound, and by the acceleration."""
 
     def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any, /) -> None:

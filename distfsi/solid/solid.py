@@ -1,9 +1,9 @@
 """The solid: smoothed particles, their motion and their budget (paper, Sec. 2.1 and Appendix A).
 
-How particles act on each other is a matter of the solid's form: updated.py, total_lagrangian.py. A step needs
-three or four messages per pair of ranks that are neighbours: who needs whom, the state, in the updated form the
-corrected stress, the new velocity. Time integration is leapfrog: forces at x^n take v^(n-1/2) to v^(n+1/2), which
-strains and moves the particles.
+How particles of a body act on each other is a matter of its form: updated.py, total_lagrangian.py; how bodies do, of
+contact.py. A step needs three to five messages per pair of ranks that are neighbours: who needs whom, the state, in the
+updated form the corrected stress, where bodies meet their pressure, the new velocity. Time integration is leapfrog:
+forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the particles.
 """
 
 from __future__ import annotations
@@ -24,17 +24,16 @@ from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid import fields, neighbours, pieces, total_lagrangian, updated
+from distfsi.solid import contact, fields, neighbours, pieces, total_lagrangian, updated, walls
 from distfsi.solid.formulas.stress import von_mises
+from distfsi.solid.interactions import contacts_of, form_of
 from distfsi.solid.kernels import motion
 from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
-from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.neighbours import Near
 from distfsi.solid.packed import packed
-from distfsi.solid.protocol import SolidForm
-from distfsi.solid.total_lagrangian import TotalLagrangian
-from distfsi.solid.updated import UpdatedLagrangian
+from distfsi.solid.sides import Sides
 
 DRIVERS = (
     *particle_kernels.EXCHANGE,
@@ -47,6 +46,8 @@ DRIVERS = (
     motion.move,
     *updated.DRIVERS,
     *total_lagrangian.DRIVERS,
+    *contact.DRIVERS,
+    *walls.DRIVERS,
 )
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
@@ -83,7 +84,6 @@ class Solid:
         self._points = MaterialGroups(self.materials, device, constants)
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, device, self.kernels)
-        self.form = self._form(scene)
         # Sums over all steps, and of the last one.
         self._boundary_impulse = np.zeros((blocks.local_count, D))
         self._gravity_work = np.zeros(blocks.local_count)
@@ -103,12 +103,18 @@ class Solid:
         c = self._own_particles(scene)
         self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
-        self._begin()
+        self._begin(scene)
 
-    def _begin(self) -> None:
-        """Collective. What materials and bonds find before the first step."""
+    def _begin(self, scene: Scene) -> None:
+        """Collective. What materials find before the first step, and how particles act on each other."""
         self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
+        sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
+        given = (scene, self.kernels, self.exchange, self.communicator)
+        self.form = form_of(*given, self._points, sides)
         self.form.bind(self.columns, self.exchange)
+        self._contacts = contacts_of(*given, sides)
+        for each in self._contacts:
+            each.bind(self.columns)
 
     def _constants(self) -> dict[str, object]:
         """What the kernels are specialised for."""
@@ -121,16 +127,9 @@ class Solid:
             "VISCOSITY_BETA": solid.viscosity_beta,
             "SMOOTHING_RATIO": solid.smoothing,
             "ARTIFICIAL_STRESS": solid.artificial_stress,
+            "FRICTION": solid.friction,
             "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
-
-    def _form(self, scene: Scene) -> SolidForm:
-        solid, search = self._scene, NeighbourSearch(self.kernels, self.device, scene.domain.lower, scene.domain.upper)
-        if any(solid.form_of(body) == "total_lagrangian" for body in solid.bodies):
-            given = (self.communicator, solid, self._points, self.dimensions)
-            return TotalLagrangian(self.kernels, self.exchange, search, *given)
-        repels = solid.artificial_stress > 0.0
-        return UpdatedLagrangian(self.kernels, self.device, search, self.dimensions, repels)
 
     def _own_particles(self, scene: Scene) -> dict[str, np.ndarray]:
         """The columns of the particles in this rank's blocks."""
@@ -161,25 +160,34 @@ class Solid:
             self.start, self.sub_steps = now, 0
             self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
             self._run(self.kernels.average_velocity, 1, *c.read("velocity"), self.before)
-        reach = max(reach, support)
+        reach = max(reach, support, *(each.widening * support for each in self._contacts))
         plan = self.exchange.ghosts(now, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
         given = [(now, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
         position, state, *payload = plan.exchange(given)
         self._near = Near(plan, position, state, support, payload, flags)
         self._acceleration = device.zeros((own, self.dimensions))
         self._limits = device.empty((own, len(LIMITS)))
+        for each in self._contacts:
+            each.accelerate(c, self._near, self._acceleration)
         self.form.accelerate(c, self._near, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
-        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it; after prepare(). Of
-        particles with the same step the first by block, body and id is named."""
+        """Longest stable step [s] of this rank's particles (NaN: none is) and what bounds it, with the particle, its
+        body and place; after prepare(). Of particles with the same step the first by block, body and id is named."""
         if self.count == 0:
             return np.inf, "solid"
         rows = self.exchange.rows
         dt, index = rows.minimum(rows.taken(self._limits, present(self._groups).rows).reshape(-1))
         particle, cause = divmod(index, len(LIMITS))
-        dt, id = float(dt), self.columns["id"][self._order[particle]]
-        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of solid particle {id}"
+        dt = float(dt)
+        return dt if dt > 0.0 else np.nan, f"{LIMITS[cause]} of {self._name(self._order[particle])}"
+
+    def _name(self, row: int) -> str:
+        """Words for the particle in a row: its number, body and place."""
+        c, (position,) = self.columns, self.columns.read("position")
+        (x,) = self.device.download(self.exchange.rows.taken(position, self.device.array(np.array([row]))))
+        body = self._scene.bodies[c["body"][row]].name
+        return f"solid particle {c['id'][row]} of body '{body}' at ({', '.join(f'{at:.6g}' for at in x)}) m"
 
     def advance(self, dt: float) -> None:
         """Collective, after prepare(). Advance by `dt` [s]: velocities first, then positions.
@@ -205,6 +213,8 @@ class Solid:
         (around,) = self.around.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
         self.form.strain(c, self.around, dt, around, gradient)
+        for each in self._contacts:
+            each.heat(c, self.around, dt, around)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
@@ -278,7 +288,7 @@ class Solid:
         broken = np.flatnonzero(~np.isfinite(np.column_stack([c[name] for name in names])).all(axis=1))
         if len(broken):
             state = ", ".join(f"{name} {c[name][broken[0]]}" for name in names)
-            raise Diverged(f"solid particle {c['id'][broken[0]]} has no valid state at t = {time:.6g} s: {state}")
+            raise Diverged(f"{self._name(broken[0])} has no valid state at t = {time:.6g} s: {state}")
 
     def totals(self) -> dict[str, np.ndarray]:
         """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks."""

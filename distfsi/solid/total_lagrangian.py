@@ -1,7 +1,7 @@
 """The total Lagrangian form: bonds between the neighbours of the reference state, contact, and debris.
 
-A particle whose bonds are gone is debris: from then on the updated Lagrangian form moves it among other debris, with
-the state it had. So it moves bodies beside the bonded ones whose form it is; what has bonds touches what has none.
+A particle whose bonds are gone is debris: from then on the updated Lagrangian form moves it among other debris of
+its body, with the state it had. So it moves bodies beside the bonded ones whose form it is. Bodies meet in contact.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from distfsi.mesh.kernels.particles import IMAGES
 from distfsi.mesh.particles import Parity, ParticleExchange
 from distfsi.narrowing import present
 from distfsi.scene.description import Solid
-from distfsi.solid import bonds, contact, pieces
+from distfsi.solid import bonds, pieces, self_contact
 from distfsi.solid.bonds import BondNetwork, chunks_of
-from distfsi.solid.contact import Contact
 from distfsi.solid.kernels import bonds as kernels
 from distfsi.solid.kernels import cracks, motion
 from distfsi.solid.kernels.records import (
@@ -35,6 +34,8 @@ from distfsi.solid.kernels.records import (
 )
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.self_contact import SelfContact
+from distfsi.solid.sides import Sides
 from distfsi.solid.updated import Carried, UpdatedLagrangian
 
 DRIVERS = (
@@ -54,7 +55,7 @@ DRIVERS = (
     motion.pack_motion,
     cracks.carry_unbonded,
     cracks.keep_rates,
-    *contact.DRIVERS,
+    *self_contact.DRIVERS,
 )
 
 
@@ -85,14 +86,16 @@ class TotalLagrangian:
         communicator: Communicator,
         scene: Solid,
         materials: MaterialGroups,
+        sides: Sides,
         dimensions: int,
     ):
         self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
         self._communicator, self._materials, self._dimensions = communicator, materials, dimensions
-        self._network = BondNetwork(kernels, exchange, search, communicator, scene)
+        self._network = BondNetwork(kernels, exchange, search, communicator, scene, sides)
         self._mixed = any(scene.form_of(body) != "total_lagrangian" for body in scene.bodies)
-        self._unbonded = UpdatedLagrangian(kernels, self._device, search, dimensions, scene.artificial_stress > 0.0)
-        self._contact = Contact(kernels, self._rows, search, dimensions)
+        repels = scene.artificial_stress > 0.0
+        self._unbonded = UpdatedLagrangian(kernels, self._device, search, sides, dimensions, repels)
+        self._self_contact = SelfContact(kernels, self._rows, search, sides, dimensions)
         self._cut_since_labelled = True
         self._bonds: Bonds | None = None  # of the last accelerate(), and the packed state of its bonds
         self._bond_state: Any = None
@@ -204,9 +207,9 @@ class TotalLagrangian:
             self._unbonded.accelerate_among(near, self._rows.marked(mark)[1], carried, acceleration, limits)
         volume, mass = c.read("volume", "mass")
         self._run(near.own, "accelerate_bonds", bonds, bond_state, volume, mass, acceleration)
-        self._contact.find(c, near, reference, payload, self._network.continued)
-        self._contact.accelerate(mass, acceleration)
-        given = (self._material(c), *c.read("deformation"), acceleration, limits)
+        self._self_contact.find(c, near, reference, payload)
+        self._self_contact.accelerate(mass, acceleration)
+        given = (self._material(c), *c.read("deformation"), acceleration, *c.write("detaching"), limits)
         self._run(near.own, "limit_bonds", bonds.count, self._network.bodies, *given)
         self._bonds, self._bond_state = bonds, bond_state
 
@@ -240,7 +243,7 @@ class TotalLagrangian:
         volumes = Volumes(*c.read(*Volumes._fields))
         kept = (Fit(*c.write("correction", "deformation")), *c.write("detaching", "exposed"))
         self._run(count, "accept_fit", rows, found, moments, volumes, *kept)
-        self._contact.forget()
+        self._self_contact.forget()
         self._cut_since_labelled = True
 
     def strain(self, c: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
@@ -259,7 +262,7 @@ class TotalLagrangian:
         result = StrainResult(energy, viscous_pressure, gradient, detaching)
         self._run(near.own, "strain_bonds", dt, self._bonds, self._bond_state, motion, point, fit, result)
         (mass,), (energy,) = c.read("mass"), c.write("energy")
-        self._contact.heat(mass, dt, motion, energy)
+        self._self_contact.heat(mass, dt, motion, energy)
         if breaking and dt > 0.0:
             self._materials.open_voids(c, dt, present(self._bonds).count, gradient)
 

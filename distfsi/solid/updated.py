@@ -12,8 +12,9 @@ from distfsi.mesh.particles import Parity, ParticleExchange
 from distfsi.solid.kernels import pairs as kernels
 from distfsi.solid.kernels.records import Interaction, Neighbours
 from distfsi.solid.neighbours import Near, NeighbourSearch
+from distfsi.solid.sides import Sides
 
-DRIVERS = (kernels.correct_gradients, kernels.accelerate_pairs, kernels.strain_pairs)
+DRIVERS = (kernels.keep_own_side, kernels.correct_gradients, kernels.accelerate_pairs, kernels.strain_pairs)
 
 
 class Carried(NamedTuple):
@@ -25,17 +26,23 @@ class Carried(NamedTuple):
 
 
 class UpdatedLagrangian:
-    """Forces and strain of the particles that are near each other; of those without neighbours nothing changes.
+    """Forces and strain of particles of one side that are near each other; of those without nothing changes.
 
     velocity_gradient  (n, D D) that of the last step [1/s], by rows: a column of the solid
     """
 
     def __init__(
-        self, kernels: SimpleNamespace, device: Device, search: NeighbourSearch, dimensions: int, repels: bool = False
+        self,
+        kernels: SimpleNamespace,
+        device: Device,
+        search: NeighbourSearch,
+        sides: Sides,
+        dimensions: int,
+        repels: bool = False,
     ):
         """`repels`: the kernels hold an artificial stress."""
-        self._kernels, self._device, self._search, self._dimensions = kernels, device, search, dimensions
-        self._repels = repels
+        self._kernels, self._device, self._search = kernels, device, search
+        self._sides, self._dimensions, self._repels = sides, dimensions, repels
         self._viscous = device.empty((0, 0))  # kept, as fresh memory costs more than what is put into it
         self._pairs: Interaction | None = None  # of the last accelerate()
 
@@ -63,7 +70,8 @@ class UpdatedLagrangian:
         return [(*columns.read("velocity_gradient"), tuple((a, b) for a in axes for b in axes))]
 
     def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
-        """Collective. Write the `acceleration` (own, D) of the forces and the time steps (own, 2) that they allow."""
+        """Collective. Add the `acceleration` (own, D) of the forces to that of contact, and write the time steps
+        (own, 2) that they allow."""
         neighbours = self._search.find(near.own, near.particles, near.plan.key.device, near.support)
         (rates,) = near.payload
         carried = Carried(rates, *columns.read("pressure", "deviator"))
@@ -76,6 +84,8 @@ class UpdatedLagrangian:
 
     def _act(self, near: Near, neighbours: Neighbours, carried: Carried, acceleration: Any, limits: Any) -> None:
         D, own, run, pairs = self._dimensions, near.own, self._device.run, (near.particles, neighbours)
+        if self._sides.meet:
+            run(self._kernels.keep_own_side, own, self._sides.of(near.plan.key).read, neighbours)
         parity = near.matrix + (near.tensor if self._repels else ())
         correction, stress = (self._device.empty((own, width)) for width in (D * D, len(parity)))
         run(self._kernels.correct_gradients, own, *pairs, carried.pressure, carried.deviator, correction, stress)

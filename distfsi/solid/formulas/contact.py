@@ -1,29 +1,17 @@
-"""Contact of particles without a bond: an elastic spring while they overlap, and a viscous pressure on approach."""
+"""Contact of different sides: how much of the other one a particle sees, and the pressure that follows."""
 
-from math import sqrt
-
-from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS
-from distfsi.formulas.tensors import dot
 from distfsi.solid.formulas.bonds import bulk_viscosity, shocked_share
 
 
-def contact_force(dx, dv, touching, moduli, densities, sound_speeds):
-    """Force [N] on the first of two particles `touching` [m] apart when they begin to touch; each pair (first, second).
+def contact_pressure(strain, rate, touching, moduli, densities, sound_speeds):
+    """Pressure [Pa] on a particle that another side presses on; each pair (own, of the other side).
 
-    Along dx = x_first - x_second, odd in it to the bit. The spring is that of a rod of both materials between them.
+    `strain` is the approach beyond touch over the distance `touching` [m] of the outermost particles of both, `rate`
+    [1/s] its growth. The spring is that of a rod of both materials between them; it never pulls. On approach comes the
+    viscous pressure of a shock.
     """
-    distance = max(sqrt(dot(dx, dx)), 1e-12 * touching)
-    overlap = max(1.0 - distance / touching, 0.0)
-    approach = max(-dot(dv, dx) / distance, 0.0) if overlap > 0.0 else 0.0
     modulus = 2.0 * moduli[0] * moduli[1] / (moduli[0] + moduli[1])
     density, sound_speed = 0.5 * (densities[0] + densities[1]), 0.5 * (sound_speeds[0] + sound_speeds[1])
-    share = shocked_share(-approach / touching, touching, sound_speed)
-    viscous = bulk_viscosity(-approach / touching, density, touching, sound_speed, share)
-    area = 1.0
-    if DIMENSIONS == 2:
-        area = touching
-    if DIMENSIONS == 3:
-        area = touching * touching
-    push = area * (modulus * overlap + viscous) / distance
-    return tuple(push * dx[d] for d in static_range(DIMENSIONS))
+    closing = max(rate, 0.0)
+    share = shocked_share(-closing, touching, sound_speed)
+    return modulus * strain + bulk_viscosity(-closing, density, touching, sound_speed, share)

@@ -69,6 +69,8 @@ from distfsi.solid.kernels.records import (
 
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 DETACHING_BELOW = 0.1  # smallest eigenvalue of the moment, below which the gradient's correction fades
+FLAT = 2.0  # shortest principal stretches to which viscosity sees a particle: with more it swings from step to step
+CRUSHED = 0.1  # shortest principal stretch, below which a particle detaches
 MINIMUM_FITTED = 0.5  # of the volume that the material has: bonds on one side alone may make it any
 
 
@@ -282,20 +284,27 @@ def strain_bonds(begin, end, dt, bonds: Bonds, bond_state, motion, point: Bonded
                 store_matrix(fit.deformation, i, after)
                 store_matrix(result.gradient, i, rates)
                 # Viscosity of the next step.
-                density, h, sound_speed = point.density[i], point.h[i], point.sound_speed[i]
-                unseen, shocked = unseen_share(fitted, moved, relative2), shocked_share(trace(rates), h, sound_speed)
+                density, sound_speed = point.density[i], point.sound_speed[i]
+                size = point.h[i] * min(FLAT * minimum_stretch(after), 1.0)
+                unseen, shocked = unseen_share(fitted, moved, relative2), shocked_share(trace(rates), size, sound_speed)
                 share = shocked if FAILS and point.neighbourhood_damage[i] > 0.0 else unseen
-                result.viscous_pressure[i] = bulk_viscosity(trace(rates), density, h, sound_speed, share)
+                result.viscous_pressure[i] = bulk_viscosity(trace(rates), density, size, sound_speed, share)
             else:
                 result.detaching[i] = 1
 
 
 @driver
-def limit_bonds(begin, end, bond_count, bodies: Bodies, material: BondedMaterial, deformation, acceleration, limits):
-    """limits[i] = the time steps that a bonded particle allows."""
+def limit_bonds(
+    begin, end, bond_count, bodies: Bodies, material: BondedMaterial, deformation, acceleration, detaching, limits
+):
+    """limits[i] = the time steps that a bonded particle allows. One that is crushed flat detaches: its bonds tell no
+    more of the material, and would hold up all others."""
     for i in range(begin, end):
         if bond_count[i] > 0:
-            shortest = bodies.smoothing[material.body[i]] * minimum_stretch(matrix_of(deformation, i))
+            stretch = minimum_stretch(matrix_of(deformation, i))
+            if stretch < CRUSHED:
+                detaching[i] = 1
+            shortest = bodies.smoothing[material.body[i]] * stretch
             a = vector_of(acceleration, i)
             sound_speed, viscous_pressure = material.sound_speed[i], material.viscous_pressure[i]
             limits[i, 0] = signal_time(shortest, sound_speed, viscous_pressure, material.density[i])

@@ -27,8 +27,8 @@ from distfsi.solid.kernels.matrices import (
     store_matrix,
     store_vector,
     tensor_of,
+    vector_of,
     zero_matrix,
-    zero_vector,
 )
 from distfsi.solid.kernels.records import (
     DENSITY,
@@ -82,6 +82,19 @@ def repelling(state, i, j, dx, tension):
 
 
 @driver
+def keep_own_side(begin, end, side, neighbours: Neighbours):
+    """Of the neighbours of a particle those of its own side stay, in their order."""
+    for i in range(begin, end):
+        kept = 0
+        for n in range(neighbours.count[i]):
+            j = neighbours.table[i, n]
+            if side[j] == side[i]:
+                neighbours.table[i, kept] = j
+                kept += 1
+        neighbours.count[i] = kept
+
+
+@driver
 def correct_gradients(begin, end, particles: Particles, neighbours: Neighbours, pressure, deviator, correction, stress):
     """correction[i] = what makes gradients exact for linear fields; stress[i] = the particle's stress times it and, for
     artificial stress, behind it the tensile part of the stress."""
@@ -109,10 +122,10 @@ def correct_gradients(begin, end, particles: Particles, neighbours: Neighbours, 
 def accelerate_pairs(
     begin, end, particles: Particles, neighbours: Neighbours, rates, stress, acceleration, limits, viscous
 ):
-    """acceleration[i] = that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow;
+    """Add to acceleration[i] that of the forces between particles (Eq. 5b); limits[i] = the time steps they allow;
     viscous[i] = Pi of each pair."""
     for i in range(begin, end):
-        total = zero_vector()
+        total = vector_of(acceleration, i)
         fastest = 0.0
         own = matrix_of(stress, i)
         for n in range(neighbours.count[i]):

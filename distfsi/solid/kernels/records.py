@@ -173,14 +173,13 @@ class LawTables(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """All particles, as contact sees them.
+    """All particles, as contact of a body with itself sees them.
 
     position        (count, D) [m]
     state           (count, VELOCITY + D) packed
     reference       (count, D) [m] positions in the reference state
     size            (count,) [m] side of a cube of the particle's volume
     rupture_length  (count,) [m] of the shortest bond that a particle has lost
-    body            (count,) number of the body, another one for images behind a plane at which the body ends
     """
 
     position: Any
@@ -188,7 +187,20 @@ class Contacts(NamedTuple):
     reference: Any
     size: Any
     rupture_length: Any
-    body: Any
+
+
+class SurfaceTables(NamedTuple):
+    """How the surfaces of two bodies touch, for each pair (bodies, bodies): what a particle at the surface of the first
+    sees of the second at the moment of touch (solid/contact.py).
+
+    fill       volume fraction of the second body, smoothed
+    steepness  its slope over a spacing of the first
+    strain     of the gap between the outermost particles of both, per growth of the fill by itself
+    """
+
+    fill: Any
+    steepness: Any
+    strain: Any
 
 
 class SearchMemory(NamedTuple):

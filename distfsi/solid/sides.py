@@ -1,0 +1,47 @@
+"""Sides: what holds together is one side, and different sides meet in contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from distfsi.device.interface import Columns, DualArray
+from distfsi.mesh.communicator import Communicator
+from distfsi.mesh.kernels.particles import IMAGES
+from distfsi.mesh.particles import Key, ParticleExchange
+from distfsi.narrowing import present
+from distfsi.scene.description import Solid
+
+ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symmetry plane goes on behind it
+
+
+class Sides:
+    """A body is a side, and its mirror image is another one behind a symmetry plane that it does not go through.
+
+    bodies  how many there are: a side is the number of its body, for an image behind such a plane that number more
+    meet    whether there are different sides
+    """
+
+    def __init__(self, scene: Solid, columns: Columns, exchange: ParticleExchange, communicator: Communicator):
+        """Collective. From where the particles are at the start, with ids that ascend from body to body."""
+        c, self.bodies = columns, len(scene.bodies)
+        counts = communicator.allgather(np.bincount(c["body"], minlength=self.bodies))
+        self._end = np.cumsum(np.sum(counts, axis=0))  # of the ids of each body
+        spacing, planes = np.array([body.spacing for body in scene.bodies]), exchange.planes()
+        touching = np.zeros((self.bodies, c["position"].shape[1]))
+        for axis, plane in planes:
+            close = np.abs(c["position"][:, axis] - plane) < ON_THE_PLANE * spacing[c["body"]]
+            touching[c["body"][close], axis] = 1.0
+        touching = communicator.maximum(touching.ravel()).reshape(touching.shape)
+        self._continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
+        self.meet = bool(self.bodies > 1 or any(not touching[:, axis].all() for axis, _ in planes))
+        self._device = exchange.device
+        self._key: Key | None = None
+        self._side: DualArray | None = None
+
+    def of(self, key: Key) -> DualArray:
+        """The side (count,) of particles, ghosts and images with these keys."""
+        if key is not self._key:
+            body = np.searchsorted(self._end, key.host // IMAGES, side="right")
+            beyond = key.host % IMAGES & ~self._continued[body] > 0
+            self._key, self._side = key, DualArray(self._device, body + self.bodies * beyond)
+        return present(self._side)
