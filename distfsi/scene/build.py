@@ -115,7 +115,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    rest = (given.zero_energy, given.artificial_stress, given.friction, bool(rigid))
+    rest = (given.zero_energy, given.artificial_stress, given.friction, bool(rigid), given.tied)
     return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
 
 
