@@ -18,7 +18,6 @@ cells = 40
 [time]
 end = 1.0
 [solid]
-viscosity_alpha = 0.2
 tied = [["a", "b"]]
 [solid.bodies.a]
 shape = { kind = "box", lower = -1.0, upper = 0.0 }
