@@ -20,7 +20,7 @@ from distfsi.diagnostics.derived import DerivedFields
 from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks
 from distfsi.diagnostics.schlieren import Schlieren
-from distfsi.errors import Diverged, StepFailed, StepTooShort
+from distfsi.errors import Diverged, InputError, StepFailed, StepTooShort
 from distfsi.fluid.fluid import Fluid
 from distfsi.fluid.model import fluid_model, ghost_layers
 from distfsi.mesh.blocks import Blocks, Grid, Snapshot
@@ -85,15 +85,17 @@ class Simulation:
         threads: int | None = None,
         costs: np.ndarray | None = None,
         device: Device | None = None,
+        resumed: bool = False,
     ) -> Simulation:
         """Build the parts the scene needs, and no others.
 
-        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads.
+        `costs`: those of the blocks where they are known; `device`: in the place of this rank's threads; `resumed`: a
+        snapshot will be restored.
         """
         blocks = deal_blocks(scene, communicator, costs)
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
-        fluid = Fluid(scene, model, blocks, device.with_own_clock()) if model else None
+        fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if model else None
         structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
         solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
         coupling: Coupling | None = None
@@ -101,6 +103,8 @@ class Simulation:
             coupled = COUPLINGS[scene.coupling.scheme]
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        if fluid and fluid.mapping:
+            simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
             peaks = Peaks(scene.output.peaks, fluid, coupling)
             simulation.watchers.append(peaks)
@@ -187,6 +191,16 @@ class Simulation:
             for watcher in self.watchers:
                 watcher.after_step(self)
 
+    def check_restored(self) -> None:
+        """Collective. Raise InputError on all ranks when a restart file has left a state from which no step can start,
+        or when the samples of a gauge cannot be continued."""
+        faults = self._faults(self.coupling.covered if self.coupling else None)
+        if faults:
+            raise InputError([f"the restart file holds no valid state: {faults[0]}"])
+        for watcher in self.watchers:
+            if isinstance(watcher, GaugeRecorder):
+                watcher.check()
+
     def name_limit(self) -> str:
         """Collective. What set the last time step; if the fluid did, where it was fastest and how fast; if the solid
         did, which particle and why."""
@@ -259,7 +273,7 @@ class Simulation:
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:
     """The blocks of the scene's domain, dealt to ranks by `costs`, or by the numbers of cells and particles."""
     domain = scene.domain
-    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene))
+    grid = Grid.of(domain.lower, domain.upper, domain.cells, domain.boundaries, ghost_layers(scene), domain.coordinates)
     blocks = Blocks(grid, scene.performance.block_cells, communicator, costs)
     if scene.solid is None or costs is not None:
         return blocks

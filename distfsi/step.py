@@ -152,6 +152,7 @@ def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
         fluid.average_sources(planned.start, dt)
         for stage in fluid.stages:  # Eq. 16
             advance_stage(fluid, stage, dt, timers)
+        react(fluid, planned.start, dt, timers)
         with timers("time step"):  # its signals are those of the next step
             valid = fluid.is_valid()
         if valid:
@@ -189,6 +190,7 @@ def coupled_step(fluid: Fluid, solid: Structure, coupling: Coupling, planned: Ti
         excess = solid.apply_impulse(transfer.impulse)  # Eq. 34
     with timers("forces"):
         coupling.account_work(geometry, transfer, excess)
+    react(fluid, made.start, made.dt, timers)
     with timers("solid"):
         solid.migrate()
     return made
@@ -206,6 +208,13 @@ def advance_stage(fluid: Fluid, stage: Stage, dt: float, timers: Timers) -> None
     with timers("stage"):
         fluid.advance_tiles(fluid.waiting_tiles, stage, dt)
         fluid.end_stage(stage)
+
+
+def react(fluid: Fluid, start: float, dt: float, timers: Timers) -> None:
+    """What burns in a step of `dt` [s] from `start` [s] on burns at its end."""
+    if fluid.reactions:
+        with timers("stage"):
+            fluid.wake(fluid.reactions.advance(fluid.device_state, start + dt, dt))
 
 
 def sub_cycle(solid: Structure, coupling: Coupling, planned: TimeStep) -> TimeStep:

@@ -133,8 +133,9 @@ def run_case(case: Case, ranks: int, directory: Path, seconds: float = 600.0) ->
     AssertionError when the run fails or takes longer than `seconds`.
     """
     settings = (
-        f"time.maximum_steps={case.steps + 1}",  # with its last step a run leaves no restart file
+        f"time.maximum_steps={case.steps + 1}",
         "output.restart_every=1 ns",
+        "output.restart_at_end=false",
         "output.fields_every=0",
         "output.history_every=1",
         f"output.directory={directory}",

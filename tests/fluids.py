@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+from distfsi.coordinates import coordinates_of
 from distfsi.fluid.model import FluidModel, fluid_model
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
@@ -20,10 +21,16 @@ TRACE = 1e-6
 
 
 def model_of(
-    *names: str | FluidEos, dimensions: int = 1, sources=(), limiter: str = "minmod", riemann: str = "hllc", **method
+    *names: str | FluidEos,
+    dimensions: int = 1,
+    sources=(),
+    limiter: str = "minmod",
+    riemann: str = "hllc",
+    symmetry: str = "planar",
+    **method,
 ) -> FluidModel:
     """The model of a fluid made of `MATERIALS`, or of other laws."""
     phases = tuple(Phase(str(name), name if isinstance(name, FluidEos) else MATERIALS[name]) for name in names)
     fluid = Fluid(phases, (), limiter, TRACE, (), "float64", riemann, **method)
-    domain = SimpleNamespace(dimensions=dimensions)
+    domain = SimpleNamespace(dimensions=dimensions, coordinates=coordinates_of(symmetry))
     return fluid_model(SimpleNamespace(fluid=fluid, solid=None, domain=domain, sources=sources))

@@ -9,11 +9,12 @@ import json
 import sys
 from dataclasses import replace
 
+from distfsi.coordinates.axisymmetric import Axisymmetric
 from distfsi.diagnostics.budget import Budget
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.resources.bench_ranks import measure
 from distfsi.resources.works import AIR, AMBIENT_AIR, BURNT_TNT, TNT, WATER, gases
-from distfsi.scene.description import Performance, Scene
+from distfsi.scene.description import Domain, Performance, Scene
 from distfsi.simulation import Simulation
 from mpi_rest import cells_of
 
@@ -24,6 +25,7 @@ TNT_AIR = (TNT, AIR), BURNT_TNT, AMBIENT_AIR
 BOXES = {
     "closed": ((48, 36), WATER_AIR, WALLS),
     "periodic": ((48, 36), WATER_AIR, PERIODIC),
+    "around an axis": ((48, 36), WATER_AIR, WALLS),
     "closed in space": ((20, 16, 18), TNT_AIR, WALLS),
     "periodic in space": ((20, 16, 18), TNT_AIR, PERIODIC),
 }
@@ -36,13 +38,20 @@ def box(name: str) -> Scene:
     outside, inside = scene.fluid.regions
     ball = replace(inside.shape, center=tuple(0.4 * n for n in cells))
     regions = (outside, replace(inside, shape=ball))
+    domain = replace(scene.domain, boundaries=(ends,) * D)
     return replace(
         scene,
-        domain=replace(scene.domain, boundaries=(ends,) * D),
+        domain=around_axis(domain) if name == "around an axis" else domain,
         fluid=replace(scene.fluid, regions=regions),
         time=replace(scene.time, maximum_steps=STEPS),
         performance=Performance((12, 9, 8)[:D], (12, 3, 4)[:D]),
     )
+
+
+def around_axis(domain: Domain) -> Domain:
+    """The low end along x is the axis."""
+    low, *others = domain.boundaries
+    return replace(domain, coordinates=Axisymmetric(), boundaries=(("axis", low[1]), *others))
 
 
 def main():

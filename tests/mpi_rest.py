@@ -19,6 +19,7 @@ from launch import ROOT
 PLANE = """
 title = "at rest"
 [domain]
+symmetry = "{symmetry}"
 lower = [0, 0]
 upper = [{cells[0]}, {cells[1]}]
 cells = {cells}
@@ -144,6 +145,7 @@ def plane(**given):
         "center": [27.5, 8.5],
         "block": [16, 12],
         "tile": [8, 4],
+        "symmetry": "planar",
     }
     return PLANE.format(**values | given)
 
@@ -156,6 +158,9 @@ SCENES = {
     "periodic": plane(x=["periodic", "periodic"], center=[2, 40], steps=16),
     "inflow": plane(x=["inflow", "outflow"], inflow=STREAM, pressure=1),
     "stream": plane(x=["periodic", "periodic"], velocity=[0.3, 0]),
+    "axis": plane(symmetry="axisymmetric", x=["axis", "wall"]),
+    "along the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[-0.0, 0.3], steps=10),
+    "away from the axis": plane(symmetry="axisymmetric", x=["axis", "outflow"], velocity=[0.3, 0]),
     "falling": FALLING,
     "space": SPACE,
     "interface": INTERFACE,

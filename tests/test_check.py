@@ -65,6 +65,11 @@ def test_the_report_counts_what_the_scene_holds():
     assert "3 have none" in report(load(SOD, ["performance.block_cells=400"]), ranks=4)
 
 
+def test_former_words_are_in_the_report():
+    notes = [line for line in report(load(TUBE, ["coupling.scheme=stairs"])).splitlines() if line.startswith("  note ")]
+    assert len(notes) == 1 and "'stairs' is called 'staircase' now" in notes[0]
+
+
 def test_check_by_the_command_line(tmp_path, monkeypatch):
     command = [sys.executable, "-m", "distfsi", "check", str(SOD), "--ranks", "2"]
     told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)

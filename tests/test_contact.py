@@ -12,8 +12,8 @@ from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.laws.sources.gravity import Gravity
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import Ball, Box, Cylinder, HalfSpace, Tube
+from distfsi.scene.interpenetration import overlap
 from distfsi.scene.loader import load
-from distfsi.scene.overlaps import overlap
 from distfsi.scene.packing import pack
 from distfsi.scene.shapes import dimensions
 from distfsi.simulation import Simulation

@@ -17,15 +17,15 @@ LAYERS = (
     {"study"},
     {"resources"},
     {"run"},
-    {"simulation", "direct"},
+    {"simulation", "direct", "memory"},
     {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
     {"mesh", "device", "output", "scene"},
-    {"gauges"},
+    {"gauges", "coordinates"},
     {"laws"},
     {"formulas"},
-    {"air_blast", "errors", "narrowing", "__init__"},
+    {"air_blast", "errors", "interrupts", "narrowing", "__init__"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
 ACROSS = {"mesh": "distfsi.device.interface"}

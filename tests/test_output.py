@@ -15,6 +15,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import mpi_output
+from distfsi.coordinates.planar import PLANAR
 from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
@@ -178,7 +179,9 @@ class OneRank:
 
 @pytest.fixture
 def small_blocks():
-    grid = SimpleNamespace(dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0))
+    grid = SimpleNamespace(
+        dimensions=2, cells=(6, 3, 1), lower=(0.0, 0.0, 0.0), spacing=(1.0, 1.0, 1.0), coordinates=PLANAR
+    )
     return SimpleNamespace(grid=grid, block_cells=(4, 3, 1), origin=np.array([[0, 0, 0], [4, 0, 0]]))
 
 
@@ -199,10 +202,14 @@ def test_a_run_that_dies_while_writing_leaves_the_listed_files_whole(tmp_path, s
 
 def test_a_new_run_removes_the_files_of_the_old_one(tmp_path, small_blocks):
     FieldWriter(tmp_path, small_blocks, OneRank()).write(3, 0.0, {"a": np.ones((2, 1, 3, 4))}, None)
-    (tmp_path / "cells-000004.vtkhdf.tmp").write_text("unfinished")
-    (tmp_path / "cells-of-mine.vtkhdf").write_text("not ours")
+    for name in ("cells-000004.vtkhdf.tmp", "cells-000005.vtkhdf", "cells-of-mine.vtkhdf"):
+        (tmp_path / name).write_text("neither listed nor in a manifest")
     FieldWriter(tmp_path, small_blocks, OneRank())
-    assert [path.name for path in tmp_path.iterdir()] == ["cells-of-mine.vtkhdf"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "cells-000004.vtkhdf.tmp",
+        "cells-000005.vtkhdf",
+        "cells-of-mine.vtkhdf",
+    ]
 
 
 def test_the_index_is_what_paraview_expects(tmp_path, small_blocks):

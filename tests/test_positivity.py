@@ -1,11 +1,16 @@
 """Flows that would leave cells without mass or sound speed: limited at their faces, or their steps redone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from distfsi.diagnostics.budget import Budget
 from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.mesh.communicator import Communicator
 from distfsi.scene.description import Box, FluidState, Performance, Region
+from distfsi.simulation import Simulation
+from distfsi.step import Reason, TimeStep
 from fluids import AIR, WATER, model_of
 from tubes import OPEN, advance, fields, scene_of, start
 
@@ -126,6 +131,18 @@ def test_the_cell_that_limits_the_time_step_is_named(block):
     assert simulation.name_limit() == simulation.limited_by
     simulation.step()
     assert simulation.limited_by.startswith("fluid CFL, 758.3 m/s")
+
+
+def test_the_particle_that_limits_the_time_step_is_named():
+    """That of the rank whose particles need the shortest step; by its name until one like it is named anew."""
+    step = TimeStep(reason=Reason.SOLID, particle=(2.0, "sound of solid particle 7"))
+    simulation = Simulation(None, Communicator(), None, None, None, None, None, last_step=step)
+    assert simulation.limited_by == "solid"
+    assert simulation.name_limit() == simulation.limited_by == "sound of solid particle 7"
+    simulation.last_step = TimeStep(reason=Reason.WALL)
+    assert simulation.limited_by == "wall speed"
+    simulation.last_step = replace(step, particle=(3.0, "sound of solid particle 8"))
+    assert simulation.limited_by == "sound of solid particle 7"
 
 
 def test_a_failed_step_is_redone():

@@ -18,6 +18,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from distfsi.errors import Diverged, InputError, Stopped
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import requests
+from distfsi.output.checksum import add_checksum
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.output.restart import FORMAT, Restart, newest_restart
@@ -63,9 +64,10 @@ def run_here(directory, *more, restart=None):
 
 def results(directory):
     """The bytes of all files of results in a directory, by name; how long the work takes and how evenly ranks share it
-    is no result."""
+    is no result, and those of earlier runs are not looked at."""
     paths = [path for kind in ("*.csv", "*.vtkhdf", "*.series") for path in directory.rglob(kind)]
-    return {str(path.relative_to(directory)): path.read_bytes() for path in paths if path.name not in NO_RESULT}
+    named = {str(path.relative_to(directory)): path for path in paths if path.name not in NO_RESULT}
+    return {name: path.read_bytes() for name, path in named.items() if not name.startswith("earlier-")}
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +104,9 @@ def test_restarts_on_other_numbers_of_ranks(undisturbed, tmp_path, monkeypatch):
         run_ranks(ranks, [SCRIPT, stop, *words(tmp_path, restart="auto")], timeout=120.0, code=75)
     run_here(tmp_path, restart="auto")
     assert results(tmp_path) == undisturbed, stops
-    assert [path.name for path in sorted(tmp_path.glob("restart*"))] == [f"restart-{n:08d}.h5" for n in stops[1:]]
+    assert [path.name for path in sorted(tmp_path.glob("restart*"))] == [
+        f"restart-{n:08d}.h5" for n in (stops[2], STEPS)
+    ]
 
 
 def test_wall_clock_and_stop_file(undisturbed, tmp_path, monkeypatch):
@@ -357,9 +361,11 @@ def test_what_is_no_physics_may_change(stopped, tmp_path, capsys, undisturbed):
 def test_an_incomplete_restart_file_is_passed_over(tmp_path):
     """auto takes the one before; without any that is complete it refuses rather than start anew and remove them."""
     for step in (5, 7):
-        with h5py.File(tmp_path / f"restart-{step:08d}.h5", "w") as file:
-            file.attrs.update(format=FORMAT, step=step)
-            file["scene"], file["simulation/values/time"] = "{}", 0.5
+        path = tmp_path / f"restart-{step:08d}.h5"
+        with h5py.File(path, "w") as file:
+            file.attrs.update(format=FORMAT, step=step, run="a")
+            file["scene"], file["simulation/values/time"], file["simulation/values/steps"] = "{}", 0.5, step
+        add_checksum(path, Communicator())
     newest = tmp_path / "restart-00000007.h5"
     assert newest_restart(tmp_path) == newest
     newest.write_bytes(newest.read_bytes()[:500])
@@ -368,4 +374,5 @@ def test_an_incomplete_restart_file_is_passed_over(tmp_path):
     with pytest.raises(InputError, match="restart-00000005.h5: is no complete restart file"):
         newest_restart(tmp_path)
     with pytest.raises(InputError, match="missing.h5: is no complete restart file"):
-        run_here(tmp_path, restart="missing.h5")
+        run_here(tmp_path / "out", restart="missing.h5")
+    assert not (tmp_path / "out").exists()

@@ -113,7 +113,10 @@ def test_a_second_run_keeps_the_results_of_the_first(tmp_path, capfd):
     now, first, second = (
         {p.name for p in f.iterdir()} for f in (tmp_path, tmp_path / "earlier-1", tmp_path / "earlier-2")
     )
-    assert first == second == now - {"notes.txt", "earlier-1", "earlier-2"}
+    now -= {"notes.txt", "earlier-1", "earlier-2"}
+    one, two, three = ({name for name in names if not name.startswith("restart-")} for names in (first, second, now))
+    assert one == two == three
+    assert (first - one, second - two) == ({"restart-00000001.h5"}, {"restart-00000002.h5"})
     steps = [
         read_history(folder / "history.csv")["step"][-1]
         for folder in (tmp_path / "earlier-1", tmp_path / "earlier-2", tmp_path)

@@ -292,6 +292,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "domain",
             "time",
             "fluid",
+            "charges",
             "solid",
             "sources",
             "output",
@@ -303,7 +304,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
     assert faults(BROKEN) == [
         f"titel (line 1): unknown key; expected one of {sections}; did you mean 'title'?",
         'domain.upper (line 4): [1, "2 kg"] has units kg, needs m',
-        "domain.x.1 (line 6): \"outflw\"; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic'; "
+        "domain.x.1 (line 6): \"outflw\"; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic', 'axis'; "
         "did you mean 'outflow'?",
         'time.end (line 8): "-1 us"; must be > 0',
         "time.cfl (line 9): true is no number; expected one",
@@ -332,7 +333,8 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
         (['domain.x=["periodic", "wall"]'], "domain.x (--set): one end is periodic; expected both or none"),
         (
             ['domain.x=["wall"]'],
-            "domain.x.1 (--set): is missing; expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic'",
+            "domain.x.1 (--set): is missing; "
+            "expected one of 'wall', 'symmetry', 'outflow', 'inflow', 'periodic', 'axis'",
         ),
         (["domain.x=wall"], 'domain.x (--set): "wall"; expected a list'),
         (['domain.y=["wall", "wall"]'], "domain.y (--set): the domain has 1 dimension(s), so no y ends"),

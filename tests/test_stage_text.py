@@ -49,9 +49,16 @@ CASES = {
     "2D gas, float32, first order": (("air",), 2, {"precision": "float32", "reconstruction": "first_order"}),
     "2D water and gas": (("water", "air"), 2, {"riemann": "adaptive", "sharpening": True}),
     "3D gas": (("air",), 3, {}),
+    "gas around a point": (("air",), 1, {"symmetry": "spherical", "reconstruction": "van_leer"}),
+    "gas around an axis, float32": (("air",), 2, {"symmetry": "axisymmetric", "precision": "float32"}),
 }
 LONG = {
     "2D explosive and water, float32": (("tnt", "water"), 2, {"precision": "float32"}),
+    "water and gas around an axis": (
+        ("water", "air"),
+        2,
+        {"symmetry": "axisymmetric", "riemann": "adaptive", "sharpening": True},
+    ),
     "3D gas, sideways": (("air",), 3, {"riemann": "adaptive", "reconstruction": "van_leer"}),
     "3D explosive and gas": (("tnt", "air"), 3, {"riemann": "adaptive"}),
     "3D water and gas, float32": (("water", "air"), 3, {"precision": "float32", "reconstruction": "weno5"}),

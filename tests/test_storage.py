@@ -11,9 +11,10 @@ import pytest
 
 import launch
 from distfsi.errors import InputError
+from distfsi.output.directory import held
 from distfsi.output.fields import read_cells, series
 from distfsi.output.history import read_history
-from distfsi.output.storage import prepare_directory, storage
+from distfsi.output.storage import storage
 from test_output import OneRank, contents, read_with_vtk, same
 
 SCRIPT = Path(__file__).with_name("mpi_output.py")
@@ -187,7 +188,7 @@ def test_a_file_in_place_of_the_folder(mpiexec, tmp_path):
     (tmp_path / "out").write_text("mine")
     assert_refused(mpiexec, tmp_path / "out", "it is a file")
     with pytest.raises(InputError, match=f"{tmp_path}/out/below cannot be written to: Not a directory"):
-        prepare_directory(tmp_path / "out" / "below", OneRank())
+        held(tmp_path / "out" / "below", OneRank()).__enter__()
     assert (tmp_path / "out").read_text() == "mine"
 
 
@@ -202,7 +203,7 @@ def test_a_folder_without_permission(mpiexec, tmp_path):
         code = 1
         try:
             os.setuid(NOBODY)
-            prepare_directory(tmp_path / "out", OneRank())
+            held(tmp_path / "out", OneRank()).__enter__()
         except InputError as error:
             code = 0 if str(error).endswith("cannot be written to: Permission denied") else 2
         finally:

@@ -34,11 +34,14 @@ SCENES = {
     "air-3D": (("air",), 3, "float64"),
     "products-air-2D-single": (("tnt", "air"), 2, "float32"),
 }
+AROUND = {"water-air-axis": (("water", "air"), 2, "float64"), "air-point-single": (("air",), 1, "float32")}
 METHOD = {
     "water-air-2D": {"riemann": "hllc", "sharpening": True},
     "products-air-3D": {"riemann": "adaptive", "limiter": "weno5"},
     "air-3D": {"riemann": "adaptive"},
     "products-air-2D-single": {"riemann": "hll"},
+    "water-air-axis": {"riemann": "adaptive", "sharpening": True, "symmetry": "axisymmetric"},
+    "air-point-single": {"symmetry": "spherical"},
 }
 WIDE = ("ymm", "zmm") if get_host_cpu_features().get("avx") else ("xmm",)
 
@@ -51,7 +54,7 @@ def _nothing_compiled_before(tmp_path, monkeypatch):
 
 def native_row(row, scene):
     """A row for a scene, as if it were a driver, and arguments: arrays (upper-case names), reals and integers."""
-    names, dimensions, real = SCENES[scene]
+    names, dimensions, real = (SCENES | AROUND)[scene]
     model = model_of(*names, dimensions=dimensions, **{"limiter": "van_leer"} | METHOD[scene])
     arguments = [
         np.zeros(1, np.uint8 if name == "K" else real)
@@ -77,15 +80,18 @@ def count(code, operations, kind, registers):
     return sum(any(f"%{register}" in line for register in registers) for line in lines)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.__name__)
+CASES = [(row, scene) for row in ROWS for scene in SCENES]
+CASES += [(row, scene) for row in (fluid.increments_in_r_row, fluid.flux_row, fluid.update_row) for scene in AROUND]
+
+
+@pytest.mark.parametrize(("row", "scene"), CASES, ids=lambda value: getattr(value, "__name__", value))
 def test_rows_are_packed(row, scene):
     """Each loop has a packed body without any scalar arithmetic; scalar is only the remainder."""
-    names, dimensions, real = SCENES[scene]
+    names, dimensions, real = (SCENES | AROUND)[scene]
     own, other = ("d", "s") if real == "float64" else ("s", "d")
     code = machine_code(*native_row(row, scene))
     bodies = [part for part in re.split(r"^\.?\w+:", code, flags=re.MULTILINE) if count(part, "mul", "p" + own, WIDE)]
-    loops = model_of(*names, dimensions=dimensions).variables if row is fluid.increments_row else 1
+    loops = model_of(*names, dimensions=dimensions).variables if row.__name__.startswith("increments") else 1
     assert len(bodies) >= loops
     assert sum(count(body, "mul|div|sqrt", "s" + own, ["xmm"]) for body in bodies) == 0
     for operation in ("mul", "div", "sqrt"):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from distfsi.coordinates import coordinates_of
 from distfsi.laws.law import FluidEos, Source
 from distfsi.scene.description import Box, Domain, Fluid, FluidState, Output, Performance, Phase, Region, Scene, Time
 from distfsi.simulation import Simulation
@@ -33,6 +34,7 @@ def scene_of(
     scheme: str = "rk3",
     performance: Performance | None = None,
     sources: tuple[Source, ...] = (),
+    symmetry: str = "planar",
     **method: object,
 ) -> Scene:
     """A scene of one or two materials; `method`: what differs from minmod and HLLC in float64."""
@@ -46,7 +48,7 @@ def scene_of(
     )
     return Scene(
         title="",
-        domain=Domain(lower, upper, cells, boundaries or (OPEN,) * dimensions),
+        domain=Domain(lower, upper, cells, boundaries or (OPEN,) * dimensions, coordinates_of(symmetry)),
         time=Time(end, cfl, None, scheme=scheme),
         fluid=fluid,
         solid=None,

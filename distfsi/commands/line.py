@@ -15,6 +15,7 @@ from importlib import import_module
 
 from distfsi import __version__
 from distfsi.errors import DistfsiError, InputError
+from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
@@ -22,6 +23,7 @@ COMMANDS = (
     "compile",
     "plot",
     "info",
+    "clean",
     "examples",
     "materials",
     "blast",
@@ -62,16 +64,26 @@ def parser() -> argparse.ArgumentParser:
 
 def main(words: Sequence[str]) -> None:
     """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
-    if words and words[0] not in COMMANDS and not words[0].startswith("-"):
-        words = ["run", *words]
-    arguments = parser().parse_args(words)
+    arguments = parser().parse_args(with_command(words))
     arguments.execute(arguments)
 
 
+def with_command(words: Sequence[str]) -> list[str]:
+    """The words, `run` before them where they begin with no command."""
+    is_scene = words and words[0] not in COMMANDS and not words[0].startswith("-")
+    return ["run", *words] if is_scene else list(words)
+
+
 def command() -> None:
-    """The console command: `main` on the words of the process; a wrong input ends it with exit code 2."""
+    """The console command: `main` on the words of the process; a wrong input ends it with exit code 2.
+
+    A run listens to signals before it imports what takes time.
+    """
+    words = with_command(sys.argv[1:])
+    if words[:1] == ["run"]:
+        interrupts.begin_program()
     try:
-        main(sys.argv[1:])
+        main(words)
     except DistfsiError as error:
         if not isinstance(error, InputError):  # only this rank may have met it: the exception hook ends the others
             raise

@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     times.add_argument("--every", type=positive, default=1, metavar="N", help="every N-th frame")
     parser.add_argument("--slice", type=plane, metavar="AXIS=POSITION", help='plane of a 3D run: z=0.1, "x=20 mm"')
     parser.add_argument("--gauges", action="store_true", help="the gauges in the place of fields and history")
+    parser.add_argument("--mirror", action="store_true", help="both sides of the axis of an axisymmetric run")
     parser.add_argument("--movie", action="store_true", help="the frames as an animated GIF, too")
 
 

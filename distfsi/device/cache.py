@@ -5,9 +5,14 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from distfsi.errors import InputError
+
+PRIVATE = 0o700
 
 
 def cache_directory() -> Path:
@@ -15,6 +20,33 @@ def cache_directory() -> Path:
     if (root := os.environ.get("DISTFSI_CACHE")) is not None:
         return Path(root)
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "distfsi"
+
+
+def kernel_cache() -> Path:
+    """The same folder, made if there is none. What lies in it is executed: raises InputError where others can write."""
+    faults = cache_faults()
+    if faults:
+        raise InputError(faults)
+    directory = cache_directory()
+    directory.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
+    return directory
+
+
+def cache_faults() -> list[str]:
+    """Why the cache folder is not trusted: it, or where numba keeps machine code in it, belongs to somebody else, or
+    others can write into it."""
+    faults = []
+    for folder in (cache_directory(), cache_directory() / "__pycache__"):
+        try:
+            found = folder.stat()
+        except OSError:
+            continue
+        remedy = "its kernels would be executed; set DISTFSI_CACHE to a folder of your own"
+        if found.st_uid not in (os.getuid(), 0):
+            faults.append(f"the cache of kernels {folder} belongs to another user: {remedy}")
+        elif found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            faults.append(f"the cache of kernels {folder} can be written by others: {remedy}, or chmod go-w {folder}")
+    return faults
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.cache import cache_directory, file_name, locked
+from distfsi.device.cache import file_name, kernel_cache, locked
 from distfsi.device.cuda_text import dtype_of
 from distfsi.device.gpu import Queue
 from distfsi.device.kernel import Kernel, Launch
@@ -197,7 +197,7 @@ def library(name: str, text: str) -> Path:
     """The shared library compiled from a text, kept on disk. Raises RuntimeError with what the compiler says."""
     header = Path(__file__).parent / "host.h"
     stem = file_name(name, "\n".join([*compiler(), *FLAGS, header.read_text(), text]))
-    path = cache_directory() / f"{stem}.so"
+    path = kernel_cache() / f"{stem}.so"
     if path.exists():
         return path
     with locked(path):

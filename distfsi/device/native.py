@@ -1,14 +1,14 @@
 """Drivers in machine code: from a driver and a scene to a function that Python calls, by numba, kept on disk.
 
 A driver's module in the cache folder is a few lines that call the LLVM IR of device/llvm_text.py (device/runtime.py).
-It is named by all that the IR can depend on but the types of a call; numba keeps the machine code for these beside it.
+It is named by its text, which tells all that the IR can depend on but the types of a call; numba keeps the machine code
+for these beside it. A text that does not belong to its name is not executed but written anew.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-import importlib.util
 import re
 import sys
 import threading
@@ -16,20 +16,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from distfsi.device.cache import cache_directory, file_name, locked, write_whole
+from distfsi.device.cache import file_name, kernel_cache, locked, write_whole
 from distfsi.device.emit import Emission, Numbers, callees_first, given_numbers
 from distfsi.device.fingerprint import fingerprint, texts_depend_on
 from distfsi.device.llvm_text import module_of
 from distfsi.device.llvm_types import Type
 from distfsi.device.source import Bound, flat_values
-from distfsi.narrowing import present
+from distfsi.errors import OutputError
+
+OWN_NAME = "?"  # in the place of a module's name in the text that it is named by
+MODULE_NAME = re.compile(r"(\w+)_[0-9a-f]{20}")
 
 
 @dataclass
@@ -110,9 +112,9 @@ class Native:
     def name(self) -> str:
         """The name of the driver's module, which is on disk. It is found without folding where it was made before."""
         key = fingerprint(self.driver, self.constants, self.bindings, self.real)
-        known = cache_directory() / f"{self.driver.__name__}_{key}.name"
-        name = known.read_text() if known.exists() else ""
-        if not (name and _path(name).exists()):
+        known = kernel_cache() / f"{self.driver.__name__}_{key}.name"
+        name = known.read_bytes().decode(errors="replace") if known.exists() else ""
+        if _text_of(name) is None:
             name, text = self._module_text()
             write_whole(_path(name), text.encode())
             write_whole(known, name.encode())
@@ -136,14 +138,13 @@ class Native:
         digest = hashlib.sha256(texts_depend_on() + self.real.encode())
         for source, tree in functions:
             digest.update(f"{source.kind} {ast.unparse(tree)}\n".encode())
-        name = file_name(self.driver.__name__, digest.hexdigest())
         parameters = ", ".join(argument.arg for argument in emission.functions[root][1].args.args)
         lines = [
-            f"# {functions[-1][0].location}",
+            f"# {self.driver.__module__}, {digest.hexdigest()}",
             "from distfsi.device.runtime import body_of, driver",
             "",
             f"NUMBERS = {tuple(emission.numbers)!r}",
-            f'written_ = body_of("{name}")',
+            f'written_ = body_of("{OWN_NAME}")',
             "",
             "",
             "@driver",
@@ -151,19 +152,32 @@ class Native:
             f"    return written_(({parameters},))",
             "",
         ]
-        return name, "\n".join(lines)
+        name = file_name(self.driver.__name__, "\n".join(lines))
+        return name, "\n".join(lines).replace(f'"{OWN_NAME}"', f'"{name}"')
 
 
 def _path(name: str) -> Path:
-    return cache_directory() / f"{name}.py"
+    return kernel_cache() / f"{name}.py"
+
+
+def _text_of(name: str) -> str | None:
+    """The text of a module on disk; None without one, or when it is not the text that the name stands for."""
+    named = MODULE_NAME.fullmatch(name)
+    if named is None or not _path(name).exists():
+        return None
+    text = _path(name).read_bytes().decode(errors="replace")
+    return text if file_name(named[1], text.replace(f'"{name}"', f'"{OWN_NAME}"')) == name else None
 
 
 def _loaded(name: str) -> ModuleType:
     full_name = f"distfsi_kernels.{name}"
-    if full_name in sys.modules:
-        return sys.modules[full_name]
-    loader = SourceFileLoader(full_name, str(_path(name)))
-    module = importlib.util.module_from_spec(present(importlib.util.spec_from_loader(full_name, loader)))
-    sys.modules[full_name] = module
-    loader.exec_module(module)
-    return module
+    if full_name not in sys.modules:
+        text = _text_of(name)
+        if text is None:
+            raise OutputError(f"{_path(name)} is not the kernel that was written there")
+        module = ModuleType(full_name)
+        module.__file__ = str(_path(name))
+        # The text that was compared, and not what Python may have compiled of another one.
+        exec(compile(text, module.__file__, "exec"), module.__dict__)
+        sys.modules[full_name] = module
+    return sys.modules[full_name]

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from distfsi.device.cache import cache_directory, file_name, locked, write_whole
+from distfsi.device.cache import file_name, kernel_cache, locked, write_whole
 
 # No contraction of a * b + c, IEEE division and roots, no flushing of denormals: the bits are those of the CPU.
 FLAGS = ("--std=c++20", "--fmad=false", "--prec-div=true", "--prec-sqrt=true", "--ftz=false", "--ptxas-options=-v")
@@ -85,7 +85,7 @@ def _taken(size_of: Callable[..., int], take: Callable[..., int], program: ctype
 def cubin(name: str, text: str, architecture: str) -> Path:
     """A file with the machine code of a text, kept on disk. Raises CompileError."""
     stem = file_name(name, "\n".join([version(), *FLAGS, PROLOGUE, text]))
-    path = cache_directory() / f"{stem}.{architecture}.cubin"
+    path = kernel_cache() / f"{stem}.{architecture}.cubin"
     if not path.exists():
         with locked(path):
             write_whole(path, compile_text(text, architecture)[0])

@@ -29,12 +29,15 @@ class Budget:
         momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
         self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
-        self._names = [name.split(" [")[0] for name in self.conserved]
+        self._names = {n: name.split(" [")[0] for n, name in enumerate(self.conserved)}
+        if fluid and fluid.blocks.grid.coordinates.radial:  # momentum along r is not conserved: all around it is zero
+            del self._names[self.phases]
         self._start = np.full(len(self.conserved), np.nan)
         self._scale = np.zeros(len(self.conserved))
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
+            self.columns += [f"held by {share} [J]" for share in fluid.model.carried]
         self.columns += [f"left {name}" for name in self.conserved]
         if solid:
             self.columns += [
@@ -48,7 +51,7 @@ class Budget:
             self.columns += ["sub-steps", "sub-steps limited by"]
             self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
             self.columns += [f"coupling {cause} {name}" for cause in coupling.causes for name in self.conserved]
-        self.columns += [f"drift {name}" for name in self._names]
+        self.columns += [f"drift {name}" for name in self._names.values()]
 
     def row(self, simulation: Watched) -> dict[str, float | int | str]:
         """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
@@ -72,6 +75,9 @@ class Budget:
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.model.carried:
+                energies = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
+                values |= {f"held by {share} [J]": float(energy) for share, energy in energies}
         if self.solid:
             held = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])
@@ -98,7 +104,7 @@ class Budget:
         size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
         self._scale = np.maximum(self._scale, size)
         drift = (balance - self._start) / np.where(self._scale > 0.0, self._scale, 1.0)
-        return values | {f"drift {name}": d for name, d in zip(self._names, drift, strict=True)}
+        return values | {f"drift {name}": drift[n] for n, name in self._names.items()}
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
@@ -111,7 +117,7 @@ class Budget:
     def summary(self, simulation: Watched) -> str:
         """Collective. One sentence on the conservation error, and on what the coupling has created."""
         row = self.row(simulation)
-        worst = max(abs(float(row[f"drift {name}"])) for name in self._names)
+        worst = max(abs(float(row[f"drift {name}"])) for name in self._names.values())
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
             energy = sum(float(row[f"coupling {cause} energy [J]"]) for cause in self.coupling.causes)

@@ -10,14 +10,15 @@ import numpy as np
 
 from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.diagnostics.watched import Watched
+from distfsi.errors import InputError
 from distfsi.gauges import Gauge, Layer, LayerProbe, Particles, TableProbe
 from distfsi.mesh.blocks import Snapshot
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
-from distfsi.output.fields import FieldWriter
-from distfsi.output.history import History
+from distfsi.output.fields import FieldWriter, field_faults
+from distfsi.output.history import History, history_faults
 from distfsi.output.schedule import Every
-from distfsi.output.storage import Storage, storage
+from distfsi.output.storage import Storage, on_root, storage
 
 
 class SampledRun:
@@ -50,17 +51,22 @@ class TableFile:
 
     def __init__(self, path: Path, probe: TableProbe, communicator: Communicator):
         self._path, self._probe, self._communicator = path.with_suffix(".csv"), probe, communicator
+        self._columns = ["time [s]", *probe.columns]
         self._file: History | None = None
 
-    def open(self, until: float | None = None) -> None:
+    def faults(self, until: float) -> list[str]:
+        """What keeps the file from being continued after `until` [s]."""
+        return history_faults(self._path, self._columns, until)
+
+    def open(self, until: float) -> None:
         """Collective. Begin the file, or go on after `until` [s]."""
-        self._file = History(self._path, ["time [s]", *self._probe.columns], self._communicator, until)
+        self._file = History(self._path, self._columns, self._communicator, until)
 
     def write(self, run: SampledRun, time: float) -> None:
         """Collective. Add a sample."""
         rows = self._probe.rows(run)
         if self._file is None:
-            self.open()
+            self.open(time)
         present(self._file).extend(np.column_stack([np.full(len(rows), time), rows]).tolist())
 
 
@@ -72,7 +78,11 @@ class LayerFiles:
         self._writer: FieldWriter | None = None
         self.number = 0
 
-    def open(self, until: float | None = None) -> None:
+    def faults(self, until: float) -> list[str]:
+        """What keeps the files from being continued after `until` [s]."""
+        return field_faults(self._path, until)
+
+    def open(self, until: float) -> None:
         """Collective. Begin the files, or go on after `until` [s]."""
         layer: Layer = self._probe.layer
         self._writer = FieldWriter(self._path, layer, self._communicator, self._storage, until)
@@ -81,7 +91,7 @@ class LayerFiles:
         """Collective. Add a sample."""
         fields = self._probe.fields(run)
         if self._writer is None:
-            self.open()
+            self.open(time)
         present(self._writer).write(self.number, time, fields, None)
         self.number += 1
 
@@ -94,7 +104,8 @@ class GaugeRecorder:
         self.name = f"gauge {name}"
         self._run = SampledRun(simulation)
         self._probe = gauge.probe(self._run)
-        path, communicator = Path(simulation.scene.output.directory) / "gauges" / name, simulation.communicator
+        self._directory, self._communicator = Path(simulation.scene.output.directory), simulation.communicator
+        path, communicator = self._directory / "gauges" / name, self._communicator
         if isinstance(self._probe, TableProbe):
             self._files: TableFile | LayerFiles = TableFile(path, self._probe, communicator)
         elif isinstance(self._probe, LayerProbe):
@@ -102,9 +113,19 @@ class GaugeRecorder:
             self._files = LayerFiles(path, self._probe, communicator, files)
         interval = gauge.interval(simulation.scene.time.end)
         self._each_step, self._schedule, self._last = interval == 0.0, Every(interval), 0.0
+        self._goes_on = False
+
+    def check(self) -> None:
+        """Collective. Raise InputError on all ranks when the files of a restored gauge cannot be continued."""
+        faults = on_root(self._communicator, self._directory, lambda: self._files.faults(self._last))
+        if self._goes_on and faults:
+            raise InputError(faults)
 
     def after_step(self, simulation: Watched) -> None:
         """Collective. Sample the state after a step, or the one at the start, if it is time."""
+        if self._goes_on:
+            self._files.open(self._last)
+            self._goes_on = False
         if self._each_step or self._schedule.due(simulation.time):
             self._last = simulation.time
             self._files.write(self._run, simulation.time)
@@ -115,11 +136,11 @@ class GaugeRecorder:
         return {"values": {"last": np.array([self._last]), **number, **self._probe.kept()}}
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Collective. Go on from a snapshot; samples later than it are dropped."""
+        """Go on from a snapshot; with the next step samples later than it are dropped."""
         values = snapshot["values"]
         self._last = float(values["last"][0])
         self._schedule.due(self._last)
         self._probe.bring_back(values)
         if isinstance(self._files, LayerFiles):
             self._files.number = int(values["number"][0])
-        self._files.open(self._last)
+        self._goes_on = True

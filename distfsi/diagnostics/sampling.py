@@ -9,13 +9,14 @@ import numpy as np
 from distfsi.coupling.kernels.cells import COVERED
 from distfsi.coupling.protocol import Coupling
 from distfsi.fluid.fluid import Fluid
+from distfsi.mesh.blocks import Grid
 from distfsi.mesh.regions import source_cell
 
 AXES = "xyz"
 
 
 class FluidSampler:
-    """The fluid at fixed points, linear between the centers of cells in each coordinate.
+    """The fluid at fixed points, linear between the centers of cells (along r: their centroids) in each coordinate.
 
     Covered cells do not count; a point in a covered cell has no value (NaN). Beyond the outermost centers the values
     are those that the boundary implies: at a wall the normal velocity goes to zero.
@@ -31,6 +32,8 @@ class FluidSampler:
         self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in AXES[:D])]
         self.columns += ["volume_fraction"] if fluid.model.phases == 2 else []
         scaled = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
+        if grid.coordinates.radial:
+            scaled[:, 0] = _along_r(grid, positions[:, 0])
         low = np.floor(scaled)
         corners = np.array(list(product((0, 1), repeat=D)))
         share = (scaled - low)[:, None]
@@ -77,3 +80,11 @@ class FluidSampler:
             values = home + (weight * (around - home[:, None])).sum(axis=1) / weight.sum(axis=1)
         values[covered[points, self._home]] = np.nan
         return values
+
+
+def _along_r(grid: Grid, r: np.ndarray) -> np.ndarray:
+    """Where points at r [m] lie between the centroids of cells, counted in cells."""
+    faces = grid.lower[0] + grid.spacing[0] * np.arange(grid.cells[0] + 1)
+    center = grid.coordinates.centroid(faces[:-1], faces[1:])
+    center = np.concatenate([[2.0 * faces[0] - center[0]], center, [2.0 * faces[-1] - center[-1]]])
+    return np.interp(r, center, np.arange(-1.0, grid.cells[0] + 1.0))

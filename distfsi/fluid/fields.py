@@ -9,7 +9,7 @@ from distfsi.fluid.model import FluidModel
 
 def names(model: FluidModel) -> list[str]:
     """Of the fields that are written of cells; the velocity has three components."""
-    return ["density", "velocity", "pressure"] + (["volume_fraction"] if model.phases == 2 else [])
+    return ["density", "velocity", "pressure", *["volume_fraction"] * (model.phases == 2), *model.carried]
 
 
 def written(model: FluidModel, U: np.ndarray) -> dict[str, np.ndarray]:
@@ -17,8 +17,7 @@ def written(model: FluidModel, U: np.ndarray) -> dict[str, np.ndarray]:
     W, P, D = model.formula("primitives")(U), model.phases, model.dimensions
     velocity = np.zeros((*U.shape[1:], 3))
     velocity[..., :D] = np.stack(W[P : P + D], axis=-1)
-    fields = {"density": U[:P].sum(axis=0), "velocity": velocity, "pressure": W[P + D], "volume_fraction": U[-1]}
-    return {name: fields[name] for name in names(model)}
+    return dict(zip(names(model), (U[:P].sum(axis=0), velocity, *W[P + D :]), strict=True))
 
 
 def speeds(model: FluidModel, U: np.ndarray) -> list[np.ndarray]:
@@ -46,4 +45,5 @@ def _primitives(model: FluidModel) -> list[str]:
     """The names of the primitives."""
     phases, axes = range(model.phases), "xyz"[: model.dimensions]
     fraction = ["volume fraction"] if model.phases == 2 else []
-    return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), "pressure", *fraction]
+    behind = ["pressure", *fraction, *model.carried]
+    return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), *behind]

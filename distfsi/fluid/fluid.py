@@ -13,7 +13,10 @@ from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageTimes, States
 from distfsi.fluid.kernels.signals import fastest_signals
 from distfsi.fluid.kernels.stage import advance_tiles
+from distfsi.fluid.mapping import Mapping
+from distfsi.fluid.metrics import Metrics
 from distfsi.fluid.model import FluidModel
+from distfsi.fluid.reactions import Reactions
 from distfsi.fluid.rest import Rest
 from distfsi.fluid.stages import SCHEMES, Stage
 from distfsi.fluid.tiles import Tiling
@@ -35,10 +38,11 @@ class Fluid:
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
     step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
-    cells; of the others.
+    cells; of the others. mapping: what another run has left here, if this one goes on from it.
     """
 
-    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device):
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device, resumed: bool = False):
+        """`resumed`: its state will be that of a snapshot, so nothing is mapped."""
         self.model, self.blocks, self.device = model, blocks, device
         self.stages = SCHEMES[scene.time.scheme]
         self.exchange = GhostExchange(blocks, device, device.build([copy_regions], {}).copy_regions)
@@ -50,9 +54,12 @@ class Fluid:
         self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
-        initial.paint(blocks, buffers[0])
+        self.mapping = Mapping(given.map, scene, blocks) if given.map and not resumed else None
+        initial.paint(blocks, buffers[0], self.mapping)
         self._buffers = [DualArray(device, buffer) for buffer in buffers]
-        self.tiling = Tiling(blocks, device, device.tile_cells(scene.performance.tile_cells), model.conserved)
+        self.metrics = Metrics(blocks, real)
+        sizes = device.tile_cells(scene.performance.tile_cells)
+        self.tiling = Tiling(blocks, device, sizes, model.conserved, self.metrics)
         self.rest = Rest(blocks, self.tiling.first, self.tiling.size)
         waiting = np.isin(self.tiling.block, self.exchange.waiting)  # for ghosts from other ranks
         self.ready_tiles, self.waiting_tiles = np.flatnonzero(~waiting), np.flatnonzero(waiting)
@@ -63,6 +70,7 @@ class Fluid:
         self._signal: float | None = None
         self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
+        self.reactions = Reactions(given, model, blocks, device, real) if model.carried else None
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
@@ -273,8 +281,16 @@ class Fluid:
             if volume is not None:
                 part = self.active(volume, block).astype(np.float64)
                 cells = np.where(part > 0.0, part * cells, 0.0)
+            cells = self.metrics.weighted(cells, block)
             sums[block] = cells.sum(axis=(1, 2, 3)), np.abs(cells).sum(axis=(1, 2, 3))
         return sums * self._cell_volume()
+
+    def held_energies(self) -> np.ndarray:
+        """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
+        first = self.model.fraction + 1
+        shares = [self.cells(b)[first:].astype(np.float64).sum(axis=(1, 2, 3)) for b in range(self.blocks.local_count)]
+        sums = np.reshape(shares, (self.blocks.local_count, len(self.model.carried)))
+        return self.blocks.sum(sums * self._cell_volume()) * self.model.constants["HELD_ENERGY"]
 
     def leave(self, volume: np.ndarray) -> None:
         """All that the cells hold in this `volume` (local blocks, Z, Y, X) counts as having left the domain."""

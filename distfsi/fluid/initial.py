@@ -10,11 +10,14 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
+from distfsi.narrowing import present
 from distfsi.scene.description import Fluid, FluidState, Shape
 from distfsi.scene.fractions import Filled, cell_fractions, corrected
 from distfsi.scene.shapes import bounding_box, contains, volume_within
+from distfsi.scene.thermodynamics import pressure
 
 ALIKE = 1e-9  # part by which pressures differ that are one
 
@@ -22,7 +25,8 @@ ALIKE = 1e-9  # part by which pressures differ that are one
 def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
     """Collective. How much of each active cell (z, y, x) of the local blocks lies in `shape`, None where nothing does.
 
-    All together they hold the exact volume of what lies in the domain, where that is known.
+    All together they hold the exact volume of what lies in the domain, where that is known; not yet around an axis, but
+    for a sphere on it.
     """
     grid, axes = blocks.grid, blocks.grid.dimensions
     lower, upper = bounding_box(shape)
@@ -31,7 +35,10 @@ def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
         centers, spacing = blocks.cell_centers(block)[:axes], grid.spacing[:axes]
         ends = zip(centers, spacing, lower, upper, strict=True)
         near = all(x[-1] + 0.5 * h >= low and x[0] - 0.5 * h <= high for x, h, low, high in ends)
-        parts.append(cell_fractions(shape, centers, spacing).reshape(blocks.extent[block][::-1]) if near else None)
+        found = cell_fractions(shape, centers, spacing, grid.coordinates) if near else None
+        parts.append(None if found is None else found.reshape(blocks.extent[block][::-1]))
+    if grid.coordinates.radial:
+        return parts
     filled = Filled.together(Filled.by(part) for part in parts if part is not None)
     filled = Filled.together(blocks.communicator.allgather(filled))
     volume = volume_within(shape, grid.lower[:axes], grid.upper[:axes])
@@ -64,14 +71,15 @@ class InitialState:
         """Conserved state (variables,) of a region or an inflow."""
         densities = [state.density] if self.model.phases == 1 else self._densities(state)
         fraction = [] if self.model.phases == 1 else [self._fraction(state)]
-        return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction)), dtype=float)
+        shares = [1.0 if state.phase == self.model.constants["CARRIER"] else 0.0] * len(self.model.carried)
+        return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction, *shares)), dtype=float)
 
-    def paint(self, blocks: Blocks, field: np.ndarray) -> None:
+    def paint(self, blocks: Blocks, field: np.ndarray, mapping: Mapping | None = None) -> None:
         """Collective. Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers
         in part holds that part of the region's mass, momentum and energy; two materials have come to one pressure in
-        it."""
+        it. What is mapped comes over the first region."""
         ghosts = blocks.grid.ghosts[::-1]
-        for region in self.fluid.regions:
+        for number, region in enumerate(self.fluid.regions):
             state = self.of(region.state)
             parts = (
                 [np.ones((1, 1, 1))] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
@@ -81,6 +89,10 @@ class InitialState:
                 where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
                     self._lay_over(field[where], state, part)
+                if mapping and number == 0:
+                    mapping.apply(block, field[where])
+        if mapping:
+            mapping.sum_up()
 
     def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
         """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""
@@ -108,7 +120,8 @@ class InitialState:
         primitives = [self._primitives(U) for U in states]
         lowest, U = min(self._pressure(state) for state in states), shares @ np.array(states)
         energies = shares @ np.array([self._energies(W) for W in primitives])
-        fractions = (U[-1], 1.0 - U[-1])
+        at = self.model.fraction
+        fractions = (U[at], 1.0 - U[at])
         densities = [m / a for m, a in zip(U[:2], fractions, strict=True)]
         references = [reference(rho)[0] for reference, rho in zip(self._references, densities, strict=True)]
         omegas = [omega(rho)[0] for omega, rho in zip(self._omegas, densities, strict=True)]
@@ -116,14 +129,14 @@ class InitialState:
             omega * energy - a * (lowest - reference)
             for omega, energy, a, reference in zip(omegas, energies, fractions, references, strict=True)
         ]
-        phases = self._before(lowest, U[-1], 0.0, U[0], U[1], *references, *excess)
+        phases = self._before(lowest, U[at], 0.0, U[0], U[1], *references, *excess)
         change, settled = self._change(phases)
         if settled < 0.0:
             low, high = self._range(phases)
             for _ in range(HALVINGS):
                 low, high = self._halved(phases, low, high)
             change = 0.5 * (low + high)
-        U[-1] += change
+        U[at] += change
         return U
 
     def at(self, positions: np.ndarray) -> np.ndarray:
@@ -141,10 +154,25 @@ class InitialState:
 
     def _densities(self, state: FluidState) -> list[float]:
         other = 1 - state.phase
-        known = next((r.state for r in self.fluid.regions if r.state.phase == other), None)
+        known = self._products() if self._is_explosive(other) else self._first_state(other)
         alone = min(state.density, 0.5 * self.model.eos[other].maximum_density)
         trace = alone if known is None else self._on_isentrope(other, known, state.pressure)
         return [state.density, trace] if state.phase == 0 else [trace, state.density]
+
+    def _first_state(self, phase: int) -> FluidState | None:
+        """That the scene gives for a phase."""
+        return next((region.state for region in self.fluid.regions if region.state.phase == phase), None)
+
+    def _is_explosive(self, phase: int) -> bool:
+        return self.fluid.detonation is not None and self.fluid.detonation.phase == phase
+
+    def _products(self) -> FluidState:
+        """Of the explosive, burnt at its own density: what traces of it in other matter come from. As much of the dense
+        explosive itself would be heavier than many a charge."""
+        detonation = present(self.fluid.detonation)
+        burn, eos = detonation.burn, self.fluid.phases[detonation.phase].eos
+        p = pressure(eos, burn.density, burn.energy)
+        return FluidState(detonation.phase, burn.density, p, (0.0,) * self.model.dimensions)
 
     def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
         """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""

@@ -20,6 +20,7 @@ from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
 from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, Scene
+from distfsi.scene.thermodynamics import energy
 
 RECONSTRUCTIONS = {  # from the cells around, with this limiter, so many ghost layers
     "first_order": (reconstruction.muscl, limiters.first_order, 2),
@@ -39,13 +40,15 @@ TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equat
 
 @dataclass(frozen=True)
 class FluidModel:
-    """Everything the fluid's kernels are specialised with, and the meaning of its variables."""
+    """Everything the fluid's kernels are specialised with, and the meaning of its variables; `carried`: what the shares
+    are called that a phase carries."""
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
     eos: tuple[FluidEos, ...]
     dimensions: int
     body_force: BodyForce
+    carried: tuple[str, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -56,6 +59,11 @@ class FluidModel:
     def variables(self) -> int:
         """Stored fields per cell."""
         return of_kind(int, self.constants["VARIABLES"])
+
+    @property
+    def fraction(self) -> int:
+        """Index of the volume fraction of two phases."""
+        return self.conserved
 
     @property
     def conserved(self) -> int:
@@ -87,24 +95,33 @@ def fluid_model(scene: Scene) -> FluidModel:
     fluid = present(scene.fluid)
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
     eos = tuple(phase.eos for phase in fluid.phases)
-    variables = phases + dimensions + 1 + (phases == 2)
+    carried = held_energies(fluid)
+    variables = phases + dimensions + 1 + (phases == 2) + len(carried)
     model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     asymmetric = reconstructed is reconstruction.weno5
-    body_force = BodyForce(scene.sources, dimensions)
+    body_force, radial = BodyForce(scene.sources, dimensions), scene.domain.coordinates.radial
     constants = {
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
         "FLUXES": variables + more_fluxes,
+        "CARRIED": len(carried),
+        "CARRIER": carrier_of(fluid),
+        "HELD_ENERGY": tuple(carried.values()),
+        "BURNS": fluid.detonation is not None,
+        "AFTERBURNS": fluid.afterburn is not None,
+        "RELAXES": model is two_phase,
         "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
         "CLOSED_FORM": all(e.closed_form for e in eos),
         "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
         "GHOSTS": ghosts,
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
-        "ASYMMETRIC": asymmetric,
+        "ASYMMETRIC": asymmetric or radial,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
+        "RADIAL": radial,
+        "SHARES": 2 * dimensions + radial,
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
@@ -116,6 +133,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     positive = ("limiter_indicator", "is_admissible", "limited_flux")
     bindings |= {name: Bound(getattr(positivity, name)) for name in positive}
     bindings |= {"reconstructed": Bound(reconstructed), "limited_slope": Bound(limiter)}
+    if radial:
+        bindings["reconstructed_in_r"] = Bound(reconstruction.muscl_in_r)
     bindings["sharpened"] = Bound(reconstruction.overbee if fluid.sharpening else reconstruction.muscl)
     solver = zip(
         ("bounding_speeds", "contact_jump_diffusion", "slip_viscosity"), RIEMANN_SOLVERS[fluid.riemann], strict=True
@@ -124,7 +143,31 @@ def fluid_model(scene: Scene) -> FluidModel:
     for k, phase in enumerate(fluid.phases, 1):
         bindings |= {f"{name}_{k}": Bound.of(phase.eos, name, f"phase {k}") for name in ("reference", "grueneisen")}
         bindings[f"stored_reference_{k}"] = _stored_reference(fluid, k)
-    return FluidModel(constants, bindings, eos, dimensions, body_force)
+    if fluid.detonation:
+        bindings["unburnt_share"] = Bound.of(fluid.detonation.burn, "unburnt", "burn")
+    if fluid.afterburn:
+        bindings["afterburn_left"] = Bound.of(fluid.afterburn.law, "left", "afterburn")
+    return FluidModel(constants, bindings, eos, dimensions, body_force, tuple(carried))
+
+
+def carrier_of(fluid: Fluid) -> int:
+    """Index of the phase that carries shares along; 0 where none does."""
+    reaction = fluid.detonation or fluid.afterburn
+    return reaction.phase if reaction else 0
+
+
+def held_energies(fluid: Fluid) -> dict[str, float]:
+    """What the carrier's shares are called, and the energy [J/kg] that each holds back.
+
+    An explosive is its products without the energy of detonation and without pressure at its density: a stiff matter.
+    """
+    held = {}
+    if fluid.detonation:
+        burn, eos = fluid.detonation.burn, fluid.phases[fluid.detonation.phase].eos
+        held["unburnt"] = burn.energy - energy(eos, burn.density, 0.0)
+    if fluid.afterburn:
+        held["afterburn"] = fluid.afterburn.law.energy
+    return held
 
 
 def ghost_layers(scene: Scene) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from distfsi.device.interface import Device, DualArray
 from distfsi.fluid.kernels import records
+from distfsi.fluid.metrics import Metrics
 from distfsi.mesh.blocks import Blocks
 
 
@@ -23,7 +24,7 @@ class Tiling:
     limited  (tiles,) faces at the low sides of its cells whose flux was limited so far
     """
 
-    def __init__(self, blocks: Blocks, device: Device, tile_cells: Sequence[int], conserved: int):
+    def __init__(self, blocks: Blocks, device: Device, tile_cells: Sequence[int], conserved: int, metrics: Metrics):
         self.size = [min(t, n) for t, n in zip((*tile_cells, 1, 1)[:3], blocks.block_cells, strict=True)]
         self.box = records.Box(*(n + 2 * g for n, g in zip(self.size, blocks.grid.ghosts, strict=True)))
         rows, first = [], []
@@ -42,7 +43,8 @@ class Tiling:
         self.first = np.array(first, dtype=np.int64).reshape(-1, 3)
         self.through = DualArray(device, np.zeros((len(self.table), 6, conserved)))
         self.limited = DualArray(device, np.zeros(len(self.table), dtype=np.int64))
-        self._on_device, self._spacing = device.array(self.table), device.array(blocks.spacing)
+        self._on_device, self._metrics = device.array(self.table), device.array(metrics.table)
+        self._spacing = device.array(blocks.spacing)
 
     @property
     def block(self) -> np.ndarray:
@@ -62,7 +64,7 @@ class Tiling:
     def arguments(self, calm: Any, stages: Any) -> records.Tiles:
         """What a stage is given: the tiles, which of them are calm and for how many stages each has been at rest."""
         counted = self.through.device, self.limited.device
-        return records.Tiles(self._on_device, calm, stages, *counted, self._spacing)
+        return records.Tiles(self._on_device, calm, stages, *counted, self._metrics, self._spacing)
 
 
 def domain_sides(blocks: Blocks, first: np.ndarray, cells: np.ndarray) -> int:

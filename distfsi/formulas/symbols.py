@@ -32,7 +32,15 @@ TRANSFERRED = Symbol("transfer components: values that a cell gives to the parti
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 
 PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 (six- or five-equation model)")
-VARIABLES = Symbol("stored fields per cell: PHASES + DIMENSIONS + 1, and the volume fraction when there are two phases")
+VARIABLES = Symbol(
+    "stored fields per cell: PHASES + DIMENSIONS + 1, of two phases the volume fraction, and what is CARRIED"
+)
+CARRIED = Symbol("how many shares a phase carries along, each of which holds back an energy from the pressure")
+CARRIER = Symbol("index of that phase")
+HELD_ENERGY = Symbol("energy that each of the carried shares holds back [J/kg]")
+BURNS = Symbol("whether the first of the shares is that of an explosive that is unburnt")
+AFTERBURNS = Symbol("whether the last of the shares is that of products that is left to burn with air")
+RELAXES = Symbol("whether two phases come to one pressure by changes of their volumes")
 FLUXES = Symbol(
     "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
 )
@@ -44,6 +52,8 @@ CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
 BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed number of fits: then bisection")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
+RADIAL = Symbol("whether the first axis is the distance from a point or an axis (coordinates/)")
+SHARES = Symbol("parts of a cell's change that the limiter looks at: its faces, and in r what their areas differ by")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
 ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
 TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
@@ -60,6 +70,9 @@ limited_slope = chosen("limited_slope", "(backward difference, forward differenc
 reconstructed = chosen(
     "reconstructed",
     "cells around and with one -> increments from its low face to its mean, from there to its high face",
+)
+reconstructed_in_r = chosen(
+    "reconstructed_in_r", "as reconstructed along r, with the nearness to both sides, and the way from the low face"
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
 primitives = chosen("primitives", "conserved state -> primitive state")
@@ -79,6 +92,8 @@ before_relaxation = chosen("before_relaxation", "as updated -> where both phases
 range_of_change = chosen("range_of_change", "where both phases stand -> least and largest change of a1 by relaxation")
 halved_range = chosen("halved_range", "where both phases stand, range of changes -> the half with one pressure")
 fraction_after = chosen("fraction_after", "state before the step, change in the stage -> volume fraction")
+unburnt_share = chosen("unburnt_share", "Burn.unburnt of the explosive")
+afterburn_left = chosen("afterburn_left", "Afterburn.left of the products")
 bulk_modulus = chosen("bulk_modulus", "primitive state -> rho c^2 [Pa], positive where the state is admissible")
 sound_speed = chosen("sound_speed", "primitive state -> frozen speed of sound [m/s]")
 

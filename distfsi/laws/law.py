@@ -100,6 +100,41 @@ class FluidEos(Law):
         return inf
 
 
+class Burn(Law):
+    """How an explosive burns. Its phase carries the share that is unburnt, which holds back the energy of detonation:
+    the products' equation of state sees it when the share falls.
+
+    density  of the explosive at rest [kg/m3]
+    energy   of detonation [J/kg], of the products at that density
+    speed    of detonation [m/s]
+    pressure behind the front [Pa]
+    """
+
+    folder = "laws/burn"
+    density: float
+    energy: float
+    speed: float | None
+    pressure: float | None
+
+    def unburnt(self, share, since, rho, spacing):
+        """A formula for kernels: the share that is unburnt, where `share` was, a time `since` [s] the cell was lit, at
+        the density rho [kg/m3] of the phase, in cells of a size `spacing` [m]."""
+        raise NotImplementedError
+
+
+class Afterburn(Law):
+    """How products of detonation burn with air. Their phase carries the share that is left, which holds back `energy`
+    [J/kg]."""
+
+    folder = "laws/afterburn"
+    energy: float
+
+    def left(self, share, unburnt, pressure, dt):
+        """A formula for kernels: the share that is left after `dt` [s] at a pressure [Pa], where a share of the
+        explosive is `unburnt`."""
+        raise NotImplementedError
+
+
 # ---- solids ----------------------------------------------------------------------------------------------------------
 
 

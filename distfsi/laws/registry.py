@@ -5,8 +5,11 @@ from __future__ import annotations
 import pkgutil
 from dataclasses import fields
 from importlib import import_module
+from typing import TypeVar
 
 from distfsi.laws.law import Failure, Law, SolidEos, Strength
+
+AnyLaw = TypeVar("AnyLaw", bound=Law)
 
 
 def word_of(law: type[Law]) -> str:
@@ -14,7 +17,7 @@ def word_of(law: type[Law]) -> str:
     return law.__module__.rpartition(".")[2]
 
 
-def laws_of(kind: type[Law]) -> tuple[type[Law], ...]:
+def laws_of(kind: type[AnyLaw]) -> tuple[type[AnyLaw], ...]:
     """The laws in the folder of a kind, those with the fewest fields first."""
     package = import_module(f"distfsi.{kind.folder.replace('/', '.')}")
     modules = [import_module(f"{package.__name__}.{each.name}") for each in pkgutil.iter_modules(package.__path__)]

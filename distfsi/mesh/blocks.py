@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.device.interface import Device
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.curve import deal, morton_keys
@@ -47,6 +49,7 @@ class Grid:
     spacing: tuple[float, float, float]
     boundaries: tuple[tuple[str, str], ...]
     ghost_layers: int = GHOSTS
+    coordinates: Coordinates = PLANAR
 
     @classmethod
     def of(
@@ -56,6 +59,7 @@ class Grid:
         cells: tuple[int, ...],
         boundaries: tuple[tuple[str, str], ...],
         ghost_layers: int = GHOSTS,
+        coordinates: Coordinates = PLANAR,
     ) -> Grid:
         """The grid with the given values for each of its 1 to 3 dimensions."""
         unused = 3 - len(cells)
@@ -67,6 +71,7 @@ class Grid:
             spacing=_three([*spacing, *[1.0] * unused]),
             boundaries=(*((low, high) for low, high in boundaries), *[("none", "none")] * unused),
             ghost_layers=ghost_layers,
+            coordinates=coordinates,
         )
 
     @property

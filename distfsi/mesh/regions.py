@@ -40,7 +40,7 @@ def source_cell(index: int, cells: int, kinds: tuple[str, str]) -> tuple[int, in
             index = side * (cells - 1)
         elif kinds[side] == "inflow":
             return side * (cells - 1), flip, side
-        else:  # wall, symmetry
+        else:  # wall, symmetry, axis
             index = 2 * side * cells - 1 - index
             flip = 1 - flip
     return index, flip, -1

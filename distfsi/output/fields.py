@@ -10,6 +10,7 @@ Format: VTKHDF 2.0, docs.vtk.org, "VTK file formats".
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -17,11 +18,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from distfsi.output.files import write_text
 from distfsi.output.interfaces import Blocks, Communicator, Grid
-from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_root, replace, write_complete
+from distfsi.output.manifest import claim, owns, remove
+from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_root, write_complete
 
 LARGEST_LAYER = 1000  # cells along an axis that a picture takes
 KINDS = ("cells", "particles")
+AXES = "distfsi axes"  # attribute of a cells file: the names of the axes where they are not x, y, z
 
 Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype]]  # of one cell's or particle's value, and its type, by name
 Fill = Callable[[h5py.File, float], Mapping[str, h5py.Dataset]]
@@ -30,7 +34,8 @@ Fill = Callable[[h5py.File, float], Mapping[str, h5py.Dataset]]
 class FieldWriter:
     """Writes the field files of a run into `directory`.
 
-    Those of an earlier run there are removed; at a restart, which goes on with them, only those after `until` [s].
+    Those that are listed or the run's own (output/manifest.py) are removed; at a restart, which goes on with them, only
+    those after `until` [s].
     """
 
     def __init__(
@@ -166,6 +171,13 @@ def read_grid(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.maximum(attributes["WholeExtent"][1::2], 1), attributes["Origin"], attributes["Spacing"]
 
 
+def read_axes(path: Path) -> str:
+    """Names of the axes of a cells file: those of its coordinates, filled up from x, y, z."""
+    with h5py.File(path) as file:
+        named = file["VTKHDF"].attrs.get(AXES, "")
+        return named + "xyz"[len(named) :]
+
+
 def axis_across(path: Path) -> int:
     """The axis across the only layer of a cells file; z if it has several."""
     cells, _, _ = read_grid(path)
@@ -201,6 +213,8 @@ def _fill_cells(
     root.attrs["Origin"] = np.array(grid.lower, dtype=float)
     root.attrs["Spacing"] = np.array(grid.spacing, dtype=float)
     root.attrs["Direction"] = np.eye(3).ravel()
+    if grid.coordinates.radial:
+        root.attrs[AXES] = grid.coordinates.axes
     data = root.create_group("CellData")
     return {
         name: create_dataset(data, name, tuple(cells[::-1]) + parts, dtype, chunk + parts)
@@ -247,30 +261,50 @@ def _series_path(directory: Path, kind: str) -> Path:
     return directory / f"{kind}.vtkhdf.series"
 
 
+def field_faults(directory: Path, until: float) -> list[str]:
+    """What keeps the field files of a run from being continued after `until` [s]."""
+    faults = []
+    for kind in KINDS:
+        index = _series_path(directory, kind)
+        try:
+            listed = series(directory, kind)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            faults.append(f"{index}: is no list of field files: {error}")
+            continue
+        faults += [f"{path}: is missing, or empty" for time, path in listed if time <= until and not _is_there(path)]
+        if not listed and any(map(owns, directory.glob(f"{kind}-*.vtkhdf"))):
+            faults.append(f"{index}: is missing, though there are field files")
+    return faults
+
+
+def _is_there(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0
+
+
 def _keep_until(directory: Path, until: float | None) -> dict[str, dict[str, float]]:
     """Remove the files after `until` [s], or all; the times of the others, by kind and name.
 
-    They leave the index first: no listed file is ever missing.
+    They leave the index first: no listed file is ever missing. Files that are neither listed nor the run's own stay.
     """
     directory.mkdir(parents=True, exist_ok=True)
     kept: dict[str, dict[str, float]] = {}
     for kind in KINDS:
-        listed = series(directory, kind) if until is not None else []
+        listed = series(directory, kind)
         kept[kind] = {path.name: time for time, path in listed if until is not None and time <= until}
         if kept[kind]:
             _write_series(directory, kind, kept[kind])
-        else:
-            _series_path(directory, kind).unlink(missing_ok=True)
-        for pattern in (f"{kind}-[0-9]*.vtkhdf", f"{kind}-[0-9]*.vtkhdf.tmp"):
-            for path in directory.glob(pattern):
-                if path.name not in kept[kind]:
-                    path.unlink()
+        elif _series_path(directory, kind).exists():
+            remove(_series_path(directory, kind))
+        numbered = re.compile(rf"({kind}-\d{{6,}}\.vtkhdf)(\.tmp)?")
+        found = {path.with_name(name[1]) for path in directory.iterdir() if (name := numbered.fullmatch(path.name))}
+        for path in sorted(found & ({path for _, path in listed} | {path for path in found if owns(path)})):
+            if path.name not in kept[kind]:
+                remove(path)
     return kept
 
 
 def _write_series(directory: Path, kind: str, times: Mapping[str, float]) -> None:
     path = _series_path(directory, kind)
-    temporary = path.with_name(path.name + ".tmp")
     files = [{"name": name, "time": time} for name, time in times.items()]
-    temporary.write_text(json.dumps({"file-series-version": "1.0", "files": files}, indent=1) + "\n")
-    replace(temporary, path)
+    claim(path)
+    write_text(path, json.dumps({"file-series-version": "1.0", "files": files}, indent=1) + "\n")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from distfsi.narrowing import present
-from distfsi.output.fields import axis_across, field_names, read_grid, read_layer, read_particles, series
+from distfsi.output.fields import axis_across, field_names, read_axes, read_grid, read_layer, read_particles, series
 
 AXES = "xyz"
 ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of a plane, horizontal and vertical, by its normal
@@ -24,7 +24,7 @@ class Frame:
     """A run at one `time` [s]; `cells` or `particles` are empty where it has none.
 
     cells: fields (ny, nx) or (ny, nx, 3) over `extent`, x and y being the `axes` of the plane; particles: columns of
-    those in the plane, typically `spacing` [m] apart.
+    those in the plane, typically `spacing` [m] apart; names: those of the axes.
     """
 
     time: float
@@ -33,6 +33,7 @@ class Frame:
     particles: Mapping[str, np.ndarray]
     spacing: float
     axes: tuple[int, int] = (0, 1)
+    names: str = AXES
 
     @property
     def dimensions(self) -> int:
@@ -58,18 +59,19 @@ class Film:
     """The frames of a run, in the order of their `times` [s], loaded one by one.
 
     plane: where three dimensions are cut; by default where `telling_plane` says or, without particles, through the
-    middle, seen along z.
-    Raises FileNotFoundError when there are no field files, ValueError when the plane misses the domain.
+    middle, seen along z. mirror: both sides of the axis of an axisymmetric run.
+    Raises FileNotFoundError when there are no field files, ValueError when the plane misses the domain or there is no
+    axis.
     """
 
-    def __init__(self, directory: Path, plane: Plane | None = None):
+    def __init__(self, directory: Path, plane: Plane | None = None, mirror: bool = False):
         self._cells, self._particles = series(directory, "cells"), series(directory, "particles")
         present = [files for files in (self._cells, self._particles) if files]
         if not present:
             raise FileNotFoundError(f"no field files in {directory}")
         # A run that died between the two kinds of a time has one file less of the second.
         self.times = [time for time, _ in min(present, key=len)]
-        self._plane = plane
+        self._plane, self._mirror = plane, mirror
         if not self._cells:
             self._box = self._box_of_particles()
         elif plane is None and self._particles:
@@ -108,7 +110,8 @@ class Film:
         left, right, below, above = (float(corner[axis]) for axis in axes for corner in (low, high))
         at = 0.5 * (low[normal] + high[normal]) if at is None else at
         near, distance = _near_plane(read_particles(particles)[1], normal, at) if particles else ({}, 0.0)
-        return Frame(time, (left, right, below, above), fields, near, distance, axes)
+        frame = Frame(time, (left, right, below, above), fields, near, distance, axes, read_axes(cells))
+        return mirrored(frame) if self._mirror else frame
 
     def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Low and high corner of the box around all particles at all times, with some room."""
@@ -117,6 +120,20 @@ class Film:
         high = np.max([position.max(axis=0) for position in corners], axis=0)
         margin = 0.05 * (high - low).max() * (high > low)
         return low - margin, high + margin
+
+
+def mirrored(frame: Frame) -> Frame:
+    """A frame of an axisymmetric run with both sides of its axis. Raises ValueError when it does not reach one."""
+    left, right, bottom, top = frame.extent
+    if frame.names[:2] != "rz" or left != 0.0:
+        raise ValueError("only an axisymmetric run that begins at its axis can be mirrored")
+
+    def both(field: np.ndarray) -> np.ndarray:
+        other = field[:, ::-1] * (np.array([-1.0, 1.0, 1.0]) if field.ndim == 3 else 1.0)
+        return np.concatenate([other, field], axis=1)
+
+    cells = {name: both(field) for name, field in frame.cells.items()}
+    return replace(frame, extent=(-right, right, bottom, top), cells=cells)
 
 
 def telling_plane(cells: Path, particles: Path) -> Plane | None:

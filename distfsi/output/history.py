@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from distfsi.errors import InputError
+from distfsi.output.files import write_text
 from distfsi.output.interfaces import Communicator
-from distfsi.output.storage import on_root, replace
+from distfsi.output.manifest import claim
+from distfsi.output.storage import on_root
 
 
 class History:
@@ -21,7 +24,7 @@ class History:
     """
 
     def __init__(self, path: Path, columns: Sequence[str], communicator: Communicator, until: float | None = None):
-        """Collective. Raises InputError on all ranks when the file to go on with has other columns."""
+        """Collective. Raises InputError when the file to go on with has other columns or a damaged row."""
         self._columns = list(columns)
         self._path = Path(path)
         self._communicator = communicator
@@ -31,21 +34,12 @@ class History:
 
     def _begin(self, until: float | None) -> list[str]:
         """Lay down the file as it was at `until`; what is wrong with it, if anything."""
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        going_on = until is not None and self._path.exists()
-        lines = [line for line in self._read_lines() if line.endswith("\n")] if going_on else []
-        header, *rows = lines or [_line(self._columns)]
-        if header != _line(self._columns):
-            return [f"{self._path}: has other columns than this run writes; move it away before the restart"]
-        kept = [row for row in rows if until is not None and float(next(csv.reader([row]))[0]) <= until]
-        temporary = self._path.with_name(self._path.name + ".tmp")
-        temporary.write_text("".join([header, *kept]), newline="")
-        replace(temporary, self._path)
-        return []
-
-    def _read_lines(self) -> list[str]:
-        with self._path.open(newline="") as file:
-            return file.readlines()
+        kept, faults = _rows_until(self._path, self._columns, until)
+        if not faults:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            claim(self._path)
+            write_text(self._path, "".join([_line(self._columns), *kept]))
+        return faults
 
     def append(self, values: Mapping[str, float | int | str]) -> None:
         """Write one row, a value for every column, so that it is in the file when this returns.
@@ -67,6 +61,39 @@ class History:
     def _add(self, text: str) -> None:
         with self._path.open("a", newline="") as file:
             file.write(text)
+
+
+def history_faults(path: Path, columns: Sequence[str], until: float) -> list[str]:
+    """What keeps a file from being continued after the last row whose first column is at most `until`."""
+    return _rows_until(path, columns, until)[1]
+
+
+def _rows_until(path: Path, columns: Sequence[str], until: float | None) -> tuple[list[str], list[str]]:
+    """The rows of a file that stay, as they are, and what is wrong with it. A last row that was cut short is none."""
+    if until is None or not path.exists():
+        return [], []
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+        header, *rows = [line for line in file if line.endswith("\n")] or [_line(columns)]
+    if header != _line(columns):
+        return [], [f"{path}: has other columns than this run writes; move it away before the restart"]
+    kept, last = [], -math.inf
+    for number, row in enumerate(rows, 2):
+        values = next(csv.reader([row]))
+        first = _number(values[0]) if len(values) == len(columns) else math.nan
+        if not first >= last:
+            return [], [f"{path}, line {number}: is no row of this file; move the file away before the restart"]
+        if first > until:
+            break
+        kept.append(row)
+        last = first
+    return kept, []
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _line(row: Sequence[str]) -> str:

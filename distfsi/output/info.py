@@ -10,6 +10,7 @@ from distfsi.errors import InputError
 from distfsi.output.fields import field_names, series
 from distfsi.output.history import read_history
 from distfsi.output.journal import read_journal
+from distfsi.output.manifest import earlier_results
 from distfsi.output.progress import format_duration, format_time
 from distfsi.output.restart import files_of
 from distfsi.output.scales import format_bytes
@@ -32,7 +33,7 @@ def describe(directory: Path) -> str:
     lines = [*_journal(journal), *_progress(history, journal)]
     for kind in ("cells", "particles"):
         lines += _fields(directory, kind)
-    lines += [*_gauges(directory), *_restarts(directory)]
+    lines += [*_gauges(directory), *_restarts(directory), *_earlier(directory)]
     if not lines:
         raise InputError([f"{directory}: no results of a run here"])
     total = sum(path.stat().st_size for path in directory.rglob("*") if path.is_file())
@@ -82,6 +83,11 @@ def _gauges(directory: Path) -> Iterator[Line]:
     names = sorted({path.stem for path in source.glob("*.csv")} | {p.parent.name for p in source.glob("*/*.series")})
     if names:
         yield "gauges", ", ".join(names)
+
+
+def _earlier(directory: Path) -> Iterator[Line]:
+    for path, size in earlier_results(directory):
+        yield "earlier", f"{path.name}: results that were set aside, {format_bytes(size)}; removed by distfsi clean"
 
 
 def _restarts(directory: Path) -> Iterator[Line]:

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+
 Fields = Mapping[str, np.ndarray]
 
 
@@ -100,6 +102,9 @@ class Grid(Protocol):
 
     @property
     def spacing(self) -> tuple[float, float, float]: ...
+
+    @property
+    def coordinates(self) -> Coordinates: ...
 
 
 class Blocks(Protocol):

@@ -10,33 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from distfsi import __version__
-from distfsi.errors import DistfsiError, Diverged, Stopped
+from distfsi.errors import DistfsiError, Diverged, OutputError, Stopped
+from distfsi.output.files import write_text
 from distfsi.output.interfaces import Communicator
-from distfsi.output.storage import on_root, replace
+from distfsi.output.manifest import claim
 
 NAME = "run.json"
-RESULTS = (NAME, "*.csv", "*.vtkhdf", "*.vtkhdf.series", "restart-*.h5", "summary.png")
 ENDINGS: dict[type[BaseException], str] = {Stopped: "stopped", Diverged: "diverged"}
-
-
-def set_aside(directory: Path, communicator: Communicator) -> None:
-    """Collective. Move the results of an earlier run in `directory`, if there are any, to `earlier-N` in it.
-
-    Raises OutputError on all ranks.
-    """
-    on_root(communicator, directory, lambda: _move_results(directory))
-
-
-def _move_results(directory: Path) -> None:
-    if not (directory / NAME).exists():
-        return
-    number = 1 + max((int(path.name[8:]) for path in directory.glob("earlier-*") if path.name[8:].isdigit()), default=0)
-    earlier = directory / f"earlier-{number}"
-    earlier.mkdir()
-    for pattern in RESULTS:
-        for path in directory.glob(pattern):
-            path.rename(earlier / path.name)
-    print(f"the results of an earlier run are now in {earlier}", flush=True)
 
 
 class Journal:
@@ -77,10 +57,9 @@ class Journal:
 
     def _write(self) -> None:
         if self._writes:
-            with suppress(OSError):
-                temporary = self._path.with_name(NAME + ".tmp")
-                temporary.write_text(json.dumps(self._notes, indent=1) + "\n")
-                replace(temporary, self._path)
+            with suppress(OSError, OutputError):
+                claim(self._path)
+                write_text(self._path, json.dumps(self._notes, indent=1) + "\n")
 
 
 def read_journal(directory: Path) -> dict[str, Any]:

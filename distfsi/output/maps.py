@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure, SubFigure
 
 from distfsi.narrowing import of_kind
-from distfsi.output.frames import AXES, Frame
+from distfsi.output.frames import Frame
 from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
 from distfsi.output.progress import format_time
 from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
@@ -154,7 +154,7 @@ def draw_maps(
     if particles:
         draw_bar(figure, by_field.ravel().tolist(), particles.map, particles.label, sides[1])
     grid[0, 0].set(xlim=(left / length, right / length), ylim=(bottom / length, top / length))
-    horizontal, vertical = (AXES[axis] for axis in frames[0].axes)
+    horizontal, vertical = (frames[0].names[axis] for axis in frames[0].axes)
     for panel in grid[-1]:
         panel.set_xlabel(f"{horizontal} [{metres}]")
     for panel in grid[:, 0]:

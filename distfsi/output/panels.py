@@ -52,7 +52,7 @@ def draw_profiles(figure: Figure | SubFigure, frames: Sequence[Frame], fitted: S
     times = [f"t = {format_time(frame.time)}" for frame in frames]
     handles = [axes.plot([], [], color=color)[0] for color, _ in zip(TIME_COLORS, frames, strict=False)]
     rows[0].legend(handles, times, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
-    rows[-1].set(xlabel=f"x [{metres}]", xlim=(left / length, right / length))
+    rows[-1].set(xlabel=f"{frames[0].names[0]} [{metres}]", xlim=(left / length, right / length))
     figure.align_ylabels(rows)
 
 

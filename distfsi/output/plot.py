@@ -33,20 +33,21 @@ def plot(
     slice: tuple[int, float] | None = None,
     gauges: bool = False,
     movie: bool = False,
+    mirror: bool = False,
 ) -> Iterator[Path]:
     """Draw frames and history of the run in `directory` into its folder plots/, or its gauges; the files one by one.
 
     field: of the cells (default pressure); particles: field that colors the particles (default plastic strain or, where
     nothing has yielded, speed); time: only the frame nearest to it [s]; every: each so many frames; slice: plane of
     three dimensions, (axis, position [m]), by default the one that shows most of the bodies; movie: the frames as an
-    animated GIF, too. Runs along a line are drawn with all their fields. Raises InputError where the directory has no
-    such thing.
+    animated GIF, too; mirror: both sides of the axis of an axisymmetric run. Runs along a line are drawn with all their
+    fields. Raises InputError where the directory has no such thing.
     """
     folder = directory / FOLDER
     if gauges:
         yield from _draw_gauges(directory, folder)
         return
-    film = _open(directory, slice)
+    film = _open(directory, slice, mirror)
     numbers: Sequence[int] = range(0, len(film), every)
     if time is not None:
         numbers = [int(np.argmin(np.abs(np.array(film.times) - time)))]
@@ -67,9 +68,9 @@ def plot(
             yield _save(figure, folder / "history.png")
 
 
-def _open(directory: Path, plane: Plane | None) -> Film:
+def _open(directory: Path, plane: Plane | None, mirror: bool) -> Film:
     try:
-        film = Film(directory, plane)
+        film = Film(directory, plane, mirror)
         next(film.frames([0]))
     except (FileNotFoundError, ValueError) as error:
         raise InputError([f"{directory}: {error}"]) from error

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as RichProgress
@@ -58,20 +61,32 @@ class Progress:
     def say(self, message: str) -> None:
         """Print `message`; the run goes on."""
         if self._bar:
-            self._bar.console.print(message, markup=False)
+            with self._heard():
+                self._bar.console.print(message, markup=False)
         elif self._shown:
-            print(message, flush=True)
+            with self._heard():
+                print(message, flush=True)
 
     def finish(self, message: str) -> None:
         """Take the bar away and print `message`."""
         self.close()
-        if self._shown:
-            print(message, flush=True)
+        self.say(message)
 
     def close(self) -> None:
         """Take the bar away."""
         if self._bar:
-            self._bar.stop()
+            with self._heard():
+                self._bar.stop()
+            self._bar = None
+
+    @contextmanager
+    def _heard(self) -> Iterator[None]:
+        """A reader or a terminal that has gone is no reason to end a run: nothing is said any more."""
+        try:
+            yield
+        except OSError:
+            self._shown, self._bar = False, None
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
 
     def _start_bar(self) -> RichProgress:
         one_line = Column(no_wrap=True, overflow="ellipsis")
@@ -82,10 +97,11 @@ class Progress:
         return bar
 
     def _show(self, line: str, time: float | None = None) -> None:
-        if self._bar:
-            self._bar.update(self._bar.task_ids[0], completed=time, description=line)
-        else:
-            print(line, flush=True)
+        with self._heard():
+            if self._bar:
+                self._bar.update(self._bar.task_ids[0], completed=time, description=line)
+            else:
+                print(line, flush=True)
 
 
 def format_time(seconds: float) -> str:

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.output.fields import FieldWriter
-from distfsi.output.history import History
+from distfsi.errors import InputError
+from distfsi.narrowing import present
+from distfsi.output.fields import FieldWriter, field_faults
+from distfsi.output.history import History, history_faults
 from distfsi.output.interfaces import Budget, Origin, Performance, Simulation
 from distfsi.output.restart import RestartWriter, Snapshot
 from distfsi.output.schedule import Every
-from distfsi.output.storage import Storage
+from distfsi.output.storage import Storage, on_root
 
 BALANCE_COLUMNS = ("step", "time [s]", "busiest rank over mean", "blocks change hands")
 
@@ -28,31 +30,48 @@ class Records:
     restart  path of the last restart file, or None
     """
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        budget: Budget,
-        performance: Performance,
-        storage: Storage,
-        origin: Origin | None,
-    ):
-        """Collective. `budget` gives the history its columns and rows, `performance` those of the file of its name.
-        Raises OutputError on all ranks."""
-        scene, blocks, communicator = simulation.scene, simulation.blocks, simulation.communicator
-        directory = Path(scene.output.directory)
+    def __init__(self, simulation: Simulation, budget: Budget, performance: Performance, storage: Storage):
+        """`budget` gives the history its columns and rows, `performance` those of the file of its name. Nothing is
+        touched before `open`."""
+        self._simulation, self._storage = simulation, storage
+        self._directory = Path(simulation.scene.output.directory)
+        self._budget, self._timing = budget, performance
+        self._fields_due, self._frame = Every(simulation.scene.output.fields_every), 0
+        self._written_at = -1.0
+        self.restart: Path | None = None
+        self._tables = {"history.csv": budget.columns, "performance.csv": performance.columns}
+        if simulation.communicator.size > 1:
+            self._tables["balance.csv"] = list(BALANCE_COLUMNS)
+
+    def check(self, origin: Origin) -> None:
+        """Collective. Raise InputError on all ranks when what is in the directory cannot be continued."""
+
+        def find() -> list[str]:
+            found = field_faults(self._directory, origin.time)
+            for name, columns in self._tables.items():
+                found += history_faults(self._directory / name, columns, origin.step)
+            return found
+
+        faults = on_root(self._simulation.communicator, self._directory, find)
+        if faults:
+            raise InputError(faults)
+
+    def open(self, run: str, origin: Origin | None) -> None:
+        """Collective. Begin the files, or go on with those up to `origin`; `run`: which run it is.
+
+        Raises OutputError on all ranks.
+        """
+        scene, blocks, communicator = self._simulation.scene, self._simulation.blocks, self._simulation.communicator
         time, step = (origin.time, origin.step) if origin else (None, None)
         # Without its restart files first: they need the other files.
-        self._restarts = RestartWriter(directory, scene, blocks, communicator, storage, step)
-        self._fields = FieldWriter(directory, blocks, communicator, storage, time)
-        self._history = History(directory / "history.csv", budget.columns, communicator, step)
-        self._performance = History(directory / "performance.csv", performance.columns, communicator, step)
-        self._simulation, self._directory = simulation, directory
-        self._budget, self._timing = budget, performance
-        self._fields_due, self._frame = Every(scene.output.fields_every), 0
-        self._written_at = -1.0
+        self._restarts = RestartWriter(self._directory, scene, blocks, communicator, self._storage, run, step)
+        self._fields = FieldWriter(self._directory, blocks, communicator, self._storage, time)
+        tables = {
+            name: History(self._directory / name, columns, communicator, step) for name, columns in self._tables.items()
+        }
+        self._history, self._performance = tables["history.csv"], tables["performance.csv"]
+        self._balance = tables.get("balance.csv")
         self.restart = origin.path if origin else None
-        if communicator.size > 1:
-            self._balance = History(directory / "balance.csv", BALANCE_COLUMNS, communicator, step)
 
     def write(self, always: bool = False) -> None:
         """Write what is due at the simulation's time, or fields and history `always`."""
@@ -81,7 +100,7 @@ class Records:
     def write_balance(self, imbalance: float, changes_hands: bool) -> None:
         """Note how evenly the ranks have computed, and whether blocks change hands now."""
         simulation = self._simulation
-        self._balance.extend([[simulation.steps, simulation.time, imbalance, int(changes_hands)]])
+        present(self._balance).extend([[simulation.steps, simulation.time, imbalance, int(changes_hands)]])
 
     def left_behind(self) -> str:
         """What an invalid state has left, in words."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import signal
+import os
 import time as clock
 from enum import IntEnum
 from pathlib import Path
 
+from distfsi.errors import InputError
+from distfsi.interrupts import interrupts
 from distfsi.output.interfaces import Communicator
+from distfsi.output.manifest import RESERVED
+from distfsi.output.storage import on_root
 
-SIGNALS = (signal.SIGUSR1, signal.SIGTERM)
 SECONDS_BETWEEN_LOOKS = 1.0  # at the stop file
 
 
@@ -30,38 +33,48 @@ class Request(IntEnum):
 class Requests:
     """Collects what this rank is asked for: signals on any rank, the clock and the stop file on rank 0.
 
-    Handlers of SIGUSR1 and SIGTERM are in place within a `with` block; they only note that the signal came. A stop file
-    that is there at its start, or that has stopped the run, is removed: it is meant for one run.
+    Signals are noted within a `with` block (distfsi/interrupts.py), and before it where the run is the program. A stop
+    file that is there at its start, or that has stopped the run, is removed, since it is meant for one run; but only an
+    empty one, which holds nothing that could be lost.
     """
 
     def __init__(
         self, stop_file: Path, wall_clock_limit: float | None, restart_every: float, communicator: Communicator
     ):
-        """Starts the clock. `wall_clock_limit` [s] or None; `restart_every` [s] of wall-clock time, 0: never."""
-        self._stop_file = Path(stop_file)
+        """Starts the clock, unless it goes since the program's start. `wall_clock_limit` [s] or None; `restart_every`
+        [s] of wall-clock time, 0: never."""
+        self._stop_file, self._communicator = Path(stop_file), communicator
         self._limit = wall_clock_limit or float("inf")
         self._restart_every = restart_every or float("inf")
         self._decides = communicator.rank == 0
-        self._started = self._saved = self._looked = clock.monotonic()
-        self._signaled = False
+        self._saved = self._looked = clock.monotonic()
+        self._started = self._saved if interrupts.began is None else interrupts.began
         self._found = False
 
     def __enter__(self) -> Requests:
-        self._previous = {number: signal.signal(number, self._note) for number in SIGNALS}
-        self.remove_stop_file()
+        self._before = interrupts.listen()
         return self
 
     def __exit__(self, *_: object) -> None:
-        for number, handler in self._previous.items():
-            signal.signal(number, handler)
+        interrupts.leave(self._before)
 
-    def _note(self, *_: object) -> None:
-        self._signaled = True
+    def check_stop_file(self) -> None:
+        """Collective. Remove the one of an earlier run. Raises InputError on all ranks when something else is there."""
+        if RESERVED.fullmatch(self._stop_file.name):
+            raise InputError([f"output.stop_file: {self._stop_file.name} is the name of a file that runs write"])
+        self.remove_stop_file()
+        if on_root(self._communicator, self._stop_file, lambda: os.path.lexists(self._stop_file)):
+            text = "is there and no empty file, which alone would be removed; move it away or name another"
+            raise InputError([f"output.stop_file: {self._stop_file} {text}"])
 
     def remove_stop_file(self) -> None:
-        """So that it does not stop the next run."""
-        if self._decides:
-            self._stop_file.unlink(missing_ok=True)
+        """Collective. So that it does not stop the next run."""
+        on_root(self._communicator, self._stop_file, self._remove_if_empty)
+
+    def _remove_if_empty(self) -> None:
+        found = self._stop_file
+        if found.is_file() and not found.is_symlink() and found.stat().st_size == 0:
+            found.unlink()
 
     def words(self, request: Request) -> str:
         """What asks for an early end."""
@@ -77,7 +90,7 @@ class Requests:
 
     def strongest(self) -> Request:
         """What this rank is asked for now."""
-        if self._signaled:
+        if interrupts.heard:
             return Request.SIGNAL
         if not self._decides:
             return Request.NOTHING

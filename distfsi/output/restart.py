@@ -7,13 +7,18 @@ kind:
     particles  own rows; in the file all rows, of which each rank reads an equal share
     sums       rows of contributions to a total; if blocks or tiles have changed, the first row gets the total
     values     the same on all ranks
+
+A file has a checksum (output/checksum.py): before HDF5 sees it each of its bytes is known to be the one that was
+written. Then it is compared with what this run would write: parts, kinds, names, types and shapes. All of this comes
+before a run removes or overwrites anything.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +26,18 @@ import h5py
 import numpy as np
 
 from distfsi.errors import InputError
+from distfsi.narrowing import present
+from distfsi.output.checksum import damage
 from distfsi.output.interfaces import Blocks, Communicator, FilledBlocks
+from distfsi.output.manifest import owns, read, remove
+from distfsi.output.scene_text import changes, describe
 from distfsi.output.storage import Piece, Storage, create_dataset, on_root, write_complete
 
-FORMAT = 2
+FORMAT = 3
 KEPT = 2  # restart files in an output directory
-# What may change at a restart: as it likes, or so that the user is told.
-FREE = ("title", "output", "gauges", "performance", "time.wall_clock_limit", "time.smallest_step")
-REPORTED = ("time.end", "time.maximum_steps", "time.cfl")
+NAME = re.compile(r"restart-(\d{8,})\.h5")
+FARTHEST = 1e6  # from the origin, in sizes of the domain, that a particle may have flown
+WATCHERS = ("gauge ", "peaks")  # how the names of parts begin that a run may have although the restart file has not
 
 Snapshot = Mapping[str, Mapping[str, np.ndarray]]
 
@@ -39,7 +48,7 @@ Snapshot = Mapping[str, Mapping[str, np.ndarray]]
 class RestartWriter:
     """Writes `restart-STEP.h5` into a run's directory and keeps the last two.
 
-    Those of an earlier run there are removed; at a restart only those after step `until`.
+    At a restart those of the run after step `until` are removed.
     """
 
     def __init__(
@@ -49,10 +58,11 @@ class RestartWriter:
         blocks: Blocks,
         communicator: Communicator,
         storage: Storage,
+        run: str,
         until: int | None = None,
     ):
-        """Collective. Raises OutputError on all ranks."""
-        self._directory, self._scene = Path(directory), json.dumps(describe(scene))
+        """Collective. `run`: which run it is (output/manifest.py). Raises OutputError on all ranks."""
+        self._directory, self._scene, self._run = Path(directory), json.dumps(describe(scene)), run
         self._blocks, self._communicator, self._storage = blocks, communicator, storage
         on_root(communicator, self._directory, lambda: _remove_after(self._directory, until))
 
@@ -72,7 +82,7 @@ class RestartWriter:
         totals, firsts = counts.sum(axis=0), counts[: self._communicator.rank].sum(axis=0)
 
         def lay_down(file: h5py.File) -> dict[str, h5py.Dataset]:
-            file.attrs.update(format=FORMAT, step=step)
+            file.attrs.update(format=FORMAT, step=step, run=self._run)
             file["scene"] = self._scene  # too long for an attribute
             for name, value in values.items():
                 file[name] = value
@@ -90,7 +100,7 @@ class RestartWriter:
         for (name, array), first in zip(rows.items(), firsts.tolist(), strict=True):
             pieces.append((name, (first, *[0] * (array.ndim - 1)), array))
         path = self._directory / f"restart-{step:08d}.h5"
-        write_complete(self._storage, self._communicator, path, lay_down, pieces)
+        write_complete(self._storage, self._communicator, path, lay_down, pieces, with_checksum=True)
         on_root(self._communicator, path, lambda: _remove_oldest(self._directory))
         return path
 
@@ -101,98 +111,105 @@ class RestartWriter:
 
 def files_of(directory: Path) -> list[tuple[int, Path]]:
     """Step and path of the restart files in a directory, in the order of their steps."""
-    found = directory.glob("restart-[0-9]*.h5")
-    return sorted((int(path.stem.removeprefix("restart-")), path) for path in found)
+    found = ((NAME.fullmatch(path.name), path) for path in directory.glob("restart-*.h5"))
+    return sorted((int(name[1]), path) for name, path in found if name)
 
 
 def _remove_after(directory: Path, until: int | None) -> None:
-    directory.mkdir(parents=True, exist_ok=True)
-    later = [path for step, path in files_of(directory) if until is None or step > until]
-    for path in [*later, *directory.glob("restart-[0-9]*.h5.tmp")]:
-        path.unlink()
+    """What is complete and what is not."""
+    present = {path.with_name(path.name.removesuffix(".tmp")) for path in directory.glob("restart-*.h5*")}
+    for path in sorted(present):
+        name = NAME.fullmatch(path.name)
+        if name and owns(path) and (until is None or int(name[1]) > until):
+            remove(path)
 
 
 def _remove_oldest(directory: Path) -> None:
-    for _, path in files_of(directory)[:-KEPT]:
-        path.unlink()
+    own = [path for _, path in files_of(directory) if owns(path)]
+    for path in own[:-KEPT]:
+        remove(path)
 
 
 # ---- reading ---------------------------------------------------------------------------------------------------------
 
 
 class Restart:
-    """A restart file of some run: its path, after which step and at which time [s] it was written, and the scene."""
+    """A restart file: its path, by which run it was written, after which step and at which time [s], and the scene as
+    `describe` gives it."""
 
-    def __init__(self, path: Path):
-        """Raises InputError when `path` is no complete restart file of this format."""
+    def __init__(self, path: str | Path, communicator: Communicator | None = None):
+        """Collective; None: this process alone. Raises InputError on all ranks when `path` is no complete restart file
+        of this format."""
         self.path = Path(path)
-        try:
-            with h5py.File(path) as file:
-                found, self.step = int(file.attrs["format"]), int(file.attrs["step"])
-                self._scene = json.loads(file["scene"][()])
-                self.time = float(file["simulation/values/time"][()])
-        except (OSError, KeyError) as error:
-            raise InputError([f"{path}: is no complete restart file: {error}"]) from error
-        if found != FORMAT:
-            raise InputError([f"{path}: has format {found}, this version of distfsi reads format {FORMAT}"])
+        cause = damage(self.path, communicator)
+        if not cause:
+            found = _contents(self.path) if communicator is None or communicator.rank == 0 else None
+            found = present(communicator.broadcast(found) if communicator else found)
+            self.run, self.step, self.time, self.scene, cause = found
+        if cause:
+            raise InputError([f"{path}: is no complete restart file: {cause}"])
+
+    def array(self, name: str) -> np.ndarray:
+        """A whole array, by its name in the file."""
+        with h5py.File(self.path) as file:
+            return file[name][()]
 
     def changes(self, scene: Any) -> list[str]:
         """What has changed since the restart file was written and bears on the results, although it may.
 
         Raises InputError with one line per key that differs and may not.
         """
-        now = describe(scene)
-        changed = {
-            key: f"{key}: {now.get(key, 'absent')}; was {self._scene.get(key, 'absent')} in {self.path}"
-            for key in [*now, *(self._scene.keys() - now.keys())]
-            if now.get(key) != self._scene.get(key) and not any(f"{key}.".startswith(f"{free}.") for free in FREE)
-        }
-        faults = [text for key, text in changed.items() if key not in REPORTED]
-        if faults:
-            raise InputError([*faults, f"at a restart only these may change: {', '.join([*FREE, *REPORTED])}"])
-        return list(changed.values())
+        return changes(self.scene, describe(scene), self.path)
 
     def restore(self, parts: Mapping[str, Any], blocks: FilledBlocks, communicator: Communicator) -> None:
-        """Collective. Bring back the parts that were kept; the others stay as they are.
+        """Collective. Bring back the parts that were kept; gauges and peaks that are new stay as they are.
 
         Raises InputError on all ranks when a part kept other things then than it keeps now.
         """
+        now = {name: part.snapshot() for name, part in parts.items()}
+        shares = {}
         with h5py.File(self.path) as file:
-            for part in filter(file.__contains__, parts):
-                present = parts[part].snapshot()
-                if {kind: set(named) for kind, named in file[part].items()} != {k: set(v) for k, v in present.items()}:
-                    raise InputError([f"{self.path}: holds another kind of '{part}' than this run has"])
-                share = {
+            faults = list(_misfits(file, now, blocks, communicator))
+            if faults:
+                raise InputError([f"{self.path}: {fault}" for fault in faults])
+            for part in filter(file.__contains__, now):
+                shares[part] = {
                     kind: {
-                        name: READERS[kind](dataset, present[kind].get(name), blocks, communicator)
+                        name: READERS[kind](dataset, now[part][kind].get(name), blocks, communicator)
                         for name, dataset in named.items()
                     }
                     for kind, named in file[part].items()
                 }
-                parts[part].restore(share)
+        lost = [_are_lost(share.get("particles", {}).get("position"), blocks) for share in shares.values()]
+        if any(map(any, communicator.allgather(lost))):
+            raise InputError([f"{self.path}: holds particles that are nowhere near the domain"])
+        for part, share in shares.items():
+            parts[part].restore(share)
 
 
 def find_restart(where: str | None, directory: Path, scene: Any, communicator: Communicator) -> Restart | None:
     """The restart file at `where`, or "auto": the newest complete one in `directory`, None if there is none.
 
-    Collective; rank 0 tells which it is, and what of the `scene` has changed since. Raises InputError on all ranks when
-    the file is unusable or belongs to another scene.
+    Collective; rank 0 tells which it is, which were passed over, and what of the `scene` has changed since. Raises
+    InputError on all ranks when the file is unusable, or belongs to another scene or not to the results in `directory`.
     """
-    path, faults = None, []
-    if communicator.rank == 0:
-        try:
-            path = newest_restart(directory) if where == "auto" else where
-        except InputError as error:
-            faults = error.faults
-    path, faults = communicator.broadcast((path, faults))
-    if faults:
-        raise InputError(faults)
-    if path is None:
+    if where is None:
         return None
-    origin = Restart(path)
+    known = communicator.broadcast(read(directory) if communicator.rank == 0 else None)
+    if known and known.aside:
+        if where == "auto":
+            return None
+        text = f"{directory}: its results are being moved to {known.aside} for a new run; start that once more"
+        raise InputError([f"{text}, without --restart"])
+    origin, passed_over = _newest(directory, communicator) if where == "auto" else (Restart(where, communicator), [])
+    if origin is None:
+        return None
     changes = origin.changes(scene)
+    if known and known.files and known.run != origin.run:
+        text = f"{origin.path}: is not of the run whose results are in {directory}"
+        raise InputError([f"{text}; choose another output.directory, or move them away"])
     if communicator.rank == 0:
-        lines = [f"going on from {path}: step {origin.step}, t = {origin.time:.6g} s", *changes]
+        lines = [*passed_over, f"going on from {origin.path}: step {origin.step}, t = {origin.time:.6g} s", *changes]
         print("\n".join(lines), flush=True)
     return origin
 
@@ -202,15 +219,85 @@ def newest_restart(directory: Path) -> Path | None:
 
     Raises InputError when it has some and none is complete.
     """
-    faults = []
-    for _, path in reversed(files_of(directory)):
+    newest, _ = _newest(directory, None)
+    return newest.path if newest else None
+
+
+def _newest(directory: Path, communicator: Communicator | None) -> tuple[Restart | None, list[str]]:
+    """Collective. The newest complete restart file, and what is wrong with those that are newer."""
+    paths = [path for _, path in reversed(files_of(directory))]
+    faults: list[str] = []
+    for path in communicator.broadcast(paths) if communicator else paths:
         try:
-            return Restart(path).path
+            return Restart(path, communicator), faults
         except InputError as error:
             faults += error.faults
     if faults:
         raise InputError(faults)
-    return None
+    return None, []
+
+
+def _contents(path: Path) -> tuple[str, int, float, dict[str, str], str]:
+    """Run, step, time [s] and scene of a restart file, and what is wrong with it."""
+    try:
+        with h5py.File(path) as file:
+            found = int(file.attrs["format"])
+            if found != FORMAT:
+                return "", 0, 0.0, {}, f"it has format {found}, this version of distfsi reads format {FORMAT}"
+            run, step = str(file.attrs["run"]), int(file.attrs["step"])
+            scene = {str(key): str(value) for key, value in json.loads(file["scene"][()]).items()}
+            values = {name: file[f"simulation/values/{name}"][()].item() for name in ("time", "steps")}
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError) as error:
+        return "", 0, 0.0, {}, str(error)
+    time, steps = float(values["time"]), int(values["steps"])
+    if not (0.0 <= time < math.inf and steps == step >= 0):
+        return "", 0, 0.0, {}, f"it is of step {step}, but holds the state at t = {time} s after {steps} steps"
+    return run, step, time, scene, ""
+
+
+def _misfits(
+    file: h5py.File, present: Mapping[str, Snapshot], blocks: Blocks, communicator: Communicator
+) -> Iterator[str]:
+    """Collective. What a file holds otherwise than the parts of this run, of which these are snapshots."""
+    cells = tuple(blocks.grid.cells[::-1])
+    for part, snapshot in present.items():
+        counts = [len(array) for array in snapshot.get("particles", {}).values()]
+        rows = np.array(communicator.allgather(counts), dtype=np.int64).sum(axis=0)
+        if part not in file:
+            if not part.startswith(WATCHERS):
+                yield f"holds no '{part}'"
+            continue
+        kinds = {kind: set(named) if isinstance(named, h5py.Group) else set() for kind, named in file[part].items()}
+        if kinds != {kind: set(named) for kind, named in snapshot.items()}:
+            yield f"holds another kind of '{part}' than this run has"
+            continue
+        for kind, named in snapshot.items():
+            for k, (name, array) in enumerate(named.items()):
+                array, found = np.asarray(array), file[part][kind][name]
+                expected = {
+                    "cells": (*array.shape[1:-3], *cells),
+                    "particles": (int(rows[k]) if kind == "particles" else 0, *array.shape[1:]),
+                    "sums": (None, *array.shape[1:]),
+                    "values": (None,) * array.ndim,
+                }[kind]
+                if not isinstance(found, h5py.Dataset):
+                    yield f"{part}/{kind}/{name} holds no values"
+                elif found.dtype != array.dtype or not _fits(found.shape, expected):
+                    was, now = f"{found.dtype} {found.shape}", f"{array.dtype} {array.shape}"
+                    yield f"{part}/{kind}/{name} is {was}, in this run {now}"
+
+
+def _are_lost(positions: np.ndarray | None, blocks: Blocks) -> bool:
+    """Whether some of the positions (n, D) [m] are where no particle of a run has ever come."""
+    if positions is None:
+        return False
+    size = max(n * h for n, h in zip(blocks.grid.cells, blocks.grid.spacing, strict=True))
+    return not (np.abs(positions) <= FARTHEST * (size + np.abs(blocks.grid.lower).max())).all()
+
+
+def _fits(shape: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    """Whether a shape is the expected one, of which None stands for any number."""
+    return len(shape) == len(expected) and all(e in (n, None) for n, e in zip(shape, expected, strict=True))
 
 
 def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: FilledBlocks, _: Communicator) -> np.ndarray:
@@ -243,25 +330,3 @@ def _read_values(dataset: h5py.Dataset, *_: object) -> np.ndarray:
 
 
 READERS = {"cells": _read_cells, "particles": _read_particles, "sums": _read_sums, "values": _read_values}
-
-
-# ---- the scene as text -----------------------------------------------------------------------------------------------
-
-
-def describe(scene: Any) -> dict[str, str]:
-    """All that a scene says, value by value, under keys such as "fluid.phases.air.eos.gamma"."""
-    return dict(_flat(scene, ()))
-
-
-def _flat(value: Any, key: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    if is_dataclass(value):
-        if key:
-            yield ".".join(key), type(value).__name__
-        for field in fields(value):
-            if field.compare:
-                yield from _flat(getattr(value, field.name), (*key, field.name))
-    elif isinstance(value, tuple) and any(is_dataclass(entry) or isinstance(entry, tuple) for entry in value):
-        for number, entry in enumerate(value):
-            yield from _flat(entry, (*key, getattr(entry, "name", str(number))))
-    else:
-        yield ".".join(key), repr(value)

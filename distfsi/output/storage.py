@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -19,7 +18,10 @@ import h5py
 import numpy as np
 
 from distfsi.errors import InputError, OutputError
+from distfsi.output.checksum import add_checksum
+from distfsi.output.files import replace, unfinished
 from distfsi.output.interfaces import Communicator
+from distfsi.output.manifest import claim
 
 LayDown = Callable[[h5py.File], Mapping[str, h5py.Dataset]]
 ROOM = 2**20  # bytes, more than HDF5 needs besides the values
@@ -55,38 +57,29 @@ def parallel_hdf5() -> str:
 
 
 def write_complete(
-    storage: Storage, communicator: Communicator, path: Path, lay_down: LayDown, pieces: Sequence[Piece]
+    storage: Storage,
+    communicator: Communicator,
+    path: Path,
+    lay_down: LayDown,
+    pieces: Sequence[Piece],
+    with_checksum: bool = False,
 ) -> None:
     """Write a file (see Storage.write) that has its name only once it is complete and on disk; a failed one is removed.
 
+    `with_checksum`: whoever reads it can tell whether it is what was written (output/checksum.py).
     Collective. Raises OutputError on all ranks.
     """
-    temporary = path.with_name(path.name + ".tmp")
+    temporary = unfinished(path)
+    on_root(communicator, path, lambda: claim(path))
     try:
         storage.write(temporary, lay_down, pieces)
+        if with_checksum:
+            with naming(temporary):
+                add_checksum(temporary, communicator)
     except OutputError:
         on_root(communicator, temporary, lambda: temporary.unlink(missing_ok=True))
         raise
     on_root(communicator, path, lambda: replace(temporary, path))
-
-
-def prepare_directory(directory: Path, communicator: Communicator) -> None:
-    """Make a run's directory if there is none. Collective. Raises InputError on all ranks when it cannot be used."""
-    cause = communicator.broadcast(_unusable(directory) if communicator.rank == 0 else "")
-    if cause:
-        raise InputError([f"output.directory: {directory} cannot be written to: {cause}"])
-
-
-def _unusable(directory: Path) -> str:
-    """What prevents files in a directory; empty if nothing does."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory):
-            return ""
-    except FileExistsError:
-        return "it is a file"
-    except OSError as error:
-        return str(error.strerror)
 
 
 class MpiIo:
@@ -208,24 +201,6 @@ def _put(dataset: h5py.Dataset, start: Sequence[int], values: np.ndarray) -> Non
     if values.size:
         target = tuple(slice(first, first + n) for first, n in zip(start, counts, strict=True))
         dataset[target] = values[tuple(map(slice, counts))]
-
-
-# ---- names -----------------------------------------------------------------------------------------------------------
-
-
-def replace(temporary: Path, path: Path) -> None:
-    """Give a complete file its final name so that it is found whole even after a crash of the machine."""
-    _sync(temporary)
-    os.replace(temporary, path)
-    _sync(path.parent)
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 # ---- errors ----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import Any
 
 from distfsi import __version__
 from distfsi.device import cuda, nvrtc
-from distfsi.device.cache import cache_directory
+from distfsi.device.cache import cache_directory, cache_faults
 from distfsi.direct import refusal
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.storage import parallel_hdf5
@@ -37,7 +37,7 @@ def report(communicator: Communicator, ranks: list[dict[str, Any]]) -> list[tupl
         ("MPI + GPU", cuda_aware(communicator)),
         ("HDF5", parallel_hdf5()),
         ("compiler", compiler()),
-        ("kernels", f"kept in {cache_directory()}, {room(cache_directory())}"),
+        ("kernels", "; ".join(cache_faults()) or f"kept in {cache_directory()}, {room(cache_directory())}"),
         ("results", f"here, {room(Path.cwd())}"),
     ]
     found = [f"{rank['node']}, {rank['threads']} threads, {rank['GPU']}" for rank in ranks]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from distfsi.laws.registry import word_of
 from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
@@ -24,6 +25,8 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("domain", f"{size} m, {' x '.join(map(str, domain.cells))} cells of {_metres(domain.spacing)}"),
         _line("blocks", _blocks(resources)),
     ]
+    if domain.coordinates.radial:
+        lines.append(_line("symmetry", f"{word_of(type(domain.coordinates))}; totals of {domain.coordinates.whole}"))
     if scene.fluid:
         names = " and ".join(phase.name for phase in scene.fluid.phases)
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))

@@ -116,7 +116,8 @@ def _excess_cells(scene: Scene) -> Iterator[str]:
 
 def _excess_dimensions(scene: Scene) -> Iterator[str]:
     domain = scene.domain
-    for axis in range(domain.dimensions if domain.dimensions > 1 else 0):
+    first = 1 if domain.coordinates.radial else 0
+    for axis in range(first, domain.dimensions if domain.dimensions > 1 else 0):
         if _constant_along(scene, axis):
             yield f"nothing varies along {AXES[axis]}: {domain.dimensions - 1} dimension(s) without it give the same"
             return

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from dataclasses import replace
 
+from distfsi.coordinates import coordinates_of
 from distfsi.laws.law import Source
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.laws.sources.gravity import Gravity
 from distfsi.narrowing import present
 from distfsi.scene.description import (
+    Afterburn,
     Body,
     Coupling,
+    Detonation,
     Domain,
     Fluid,
     FluidState,
+    Map,
     Output,
     Peaks,
     Performance,
@@ -23,12 +29,14 @@ from distfsi.scene.description import (
     Solid,
     Time,
 )
+from distfsi.scene.detonation_tables import DetonationInput
 from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.motion import Motion
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
+    MapInput,
     ObstacleInput,
     OutputInput,
     PerformanceInput,
@@ -36,6 +44,7 @@ from distfsi.scene.schema import (
     StateInput,
     TimeInput,
 )
+from distfsi.scene.shocks import chapman_jouguet
 from distfsi.scene.thermodynamics import pressure
 
 BLOCK_CELLS = ((512,), (128, 64), (64, 32, 32))
@@ -48,7 +57,7 @@ ARRIVAL = 0.01  # of the ambient pressure
 def build_domain(given: DomainInput) -> Domain:
     """The box of cells."""
     boundaries = tuple(getattr(given, axis) for axis in AXES[: len(given.cells)])
-    return Domain(given.lower, given.upper, given.cells, boundaries)
+    return Domain(given.lower, given.upper, given.cells, boundaries, coordinates_of(given.symmetry))
 
 
 def build_time(given: TimeInput) -> Time:
@@ -80,11 +89,30 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         given.riemann,
         given.model,
         given.sharpening,
+        _detonation(given.detonation, phases) if given.detonation else None,
+        Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
+        _map(given.map, dimensions) if given.map else None,
     )
 
 
+def _index(phases: tuple[Phase, ...], name: str) -> int:
+    return [phase.name for phase in phases].index(name)
+
+
+def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation:
+    """What the law leaves out follows from the equation of state."""
+    index, burn = _index(phases, given.phase), given.burn.build()
+    found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
+    burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+
+
+def _map(given: MapInput, dimensions: int) -> Map:
+    return Map(given.run, given.center or (0.0,) * dimensions, AXES.index(given.axis))
+
+
 def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> FluidState:
-    index = [phase.name for phase in phases].index(given.phase)
+    index = _index(phases, given.phase)
     p = given.pressure
     if p is None:
         p = pressure(phases[index].eos, given.density, present(given.energy))
@@ -115,7 +143,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    rest = (given.zero_energy, given.artificial_stress, given.friction, bool(rigid), given.tied)
+    rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction, given.tied)
     return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
 
 
@@ -152,8 +180,15 @@ def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:
         given.schlieren,
         given.hdf5,
         given.restart_every,
-        given.stop_file or f"{directory}/stop",
+        stop_file_in(directory, given.stop_file),
+        given.restart_at_end,
     )
+
+
+def stop_file_in(directory: str, stop_file: str) -> str:
+    """The stop file's name in the output directory, also where it is given as a path there; any other as given."""
+    folder, name = os.path.split(stop_file)
+    return name if folder and os.path.abspath(folder) == os.path.abspath(directory) else stop_file
 
 
 def build_sources(gravity: tuple[float, ...] | None, given: Mapping[str, SourceInput]) -> tuple[Source, ...]:

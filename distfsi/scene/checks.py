@@ -12,8 +12,9 @@ import numpy as np
 from distfsi.gauges import Gauge
 from distfsi.laws.registry import word_of
 from distfsi.narrowing import present
-from distfsi.scene.build import AXES, SIDES
+from distfsi.scene.build import AXES, SIDES, stop_file_in
 from distfsi.scene.cloud import Cloud
+from distfsi.scene.coordinate_checks import check_coordinates
 from distfsi.scene.description import (
     Ball,
     Body,
@@ -27,9 +28,10 @@ from distfsi.scene.description import (
     Solid,
     Tube,
 )
+from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
+from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
-from distfsi.scene.overlaps import overlap
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     CouplingInput,
@@ -44,6 +46,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
+LONGEST_NAME = 255  # bytes of a file's name
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -61,6 +64,7 @@ def check(
         return
     yield from check_performance(sections.performance, domain.dimensions)
     faults = list(check_domain(sections.domain, domain))
+    faults += check_coordinates(sections, domain, fluid, solid)
     yield from faults
     if faults:
         return  # nothing can be placed in a domain that is wrong itself
@@ -111,6 +115,7 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+    yield from check_reactions(given, fluid)
 
 
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
@@ -127,6 +132,8 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
         yield Fault((*path, "density"), text)
         return
     cold_pressure, cold_energy = phase.eos.cold_curve(state.density)
+    if fluid.detonation is not None and fluid.detonation.phase == state.phase:
+        cold_pressure = 0.0  # what is unburnt has no energy yet, and is no gas
     if state.pressure > cold_pressure and sound_speed_squared(phase.eos, state.density, state.pressure) > 0.0:
         return
     key, bound = ("energy", f"{cold_energy:.6g} J/kg") if by_energy else ("pressure", f"{cold_pressure:.6g} Pa")
@@ -300,7 +307,11 @@ def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fl
 
 
 def check_output(given: OutputInput, present: Container[str], domain: Domain) -> Iterator[Fault]:
-    """Fields of the cells need cells."""
+    """Fields of the cells need cells; the stop file lies in the output directory."""
+    stop_file = stop_file_in(given.directory or "", given.stop_file)
+    if stop_file in ("", ".", "..") or {"/", "\0"} & set(stop_file) or len(stop_file.encode()) > LONGEST_NAME:
+        text = f"{given.stop_file[:LONGEST_NAME]!r}; expected the name of a file, which lies in the output directory"
+        yield Fault(("output", "stop_file"), text)
     for key in ("peaks", "schlieren"):
         if getattr(given, key) and "fluid" not in present:
             yield Fault(("output", key), "needs a fluid")

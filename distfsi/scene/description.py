@@ -12,8 +12,11 @@ from typing import Literal
 
 import numpy as np
 
+from distfsi.coordinates import Coordinates
+from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn as AfterburnLaw
+from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
 from distfsi.scene.motion import Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
@@ -25,7 +28,7 @@ Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
-BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic"]
+BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
 
 # ---- shapes (scene/shapes.py gives each its geometry) ----------------------------------------------------------------
@@ -138,6 +141,62 @@ class Region:
 
 
 @dataclass(frozen=True)
+class PointDetonator:
+    """Lights the explosive from `position` [m] after `delay` [s]."""
+
+    position: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineDetonator:
+    """Lights it from all points of the line from `start` to `end` [m] at once, after `delay` [s]."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlaneDetonator:
+    """Lights it from all of the plane through `point` [m] at once, after `delay` [s]."""
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    delay: float = 0.0
+
+
+Detonator = PointDetonator | LineDetonator | PlaneDetonator
+
+
+@dataclass(frozen=True)
+class Detonation:
+    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+
+    phase: int
+    burn: Burn
+    detonators: tuple[Detonator, ...]
+
+
+@dataclass(frozen=True)
+class Afterburn:
+    """How the products, a phase, burn with air."""
+
+    phase: int
+    law: AfterburnLaw
+
+
+@dataclass(frozen=True)
+class Map:
+    """What the fluid starts from beside its regions: the end of a `run` (its output directory, or a restart file) in
+    radial coordinates, about `center` [m], with its axis along `axis` of three dimensions."""
+
+    run: str
+    center: tuple[float, ...]
+    axis: int = 2
+
+
+@dataclass(frozen=True)
 class Fluid:
     """The compressible flow. One phase: Euler; two: `model`."""
 
@@ -150,6 +209,9 @@ class Fluid:
     riemann: RiemannSolver = "hllc"
     model: TwoPhaseModel = "six_equation"
     sharpening: bool = False
+    detonation: Detonation | None = None
+    afterburn: Afterburn | None = None
+    map: Map | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -201,8 +263,8 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
-    friction: float = 0.0
     obstacles: bool = False
+    friction: float = 0.0
     tied: tuple[tuple[str, ...], ...] = ()
 
     def form_of(self, body: Body) -> SolidForm:
@@ -224,12 +286,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Domain:
-    """Box of equal cells. `boundaries[axis][side]` is the kind of each end."""
+    """Box of equal cells. `boundaries[axis][side]` is the kind of each end, "axis" where a distance r begins at 0."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     cells: tuple[int, ...]
     boundaries: tuple[tuple[BoundaryKind, BoundaryKind], ...]
+    coordinates: Coordinates = PLANAR
 
     @property
     def dimensions(self) -> int:
@@ -270,8 +333,8 @@ class Output:
     """Where and how often: fields every `fields_every` [s] (0: first and last only), history every so many steps.
 
     `peaks` (None: not kept) and `schlieren` are written with the cells. `hdf5`: who writes field and restart files.
-    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only when the run is stopped, as it
-    is by a file called `stop_file`.
+    Restart files follow each other after `restart_every` [s] of wall-clock time, 0: only at the end (`restart_at_end`)
+    and when the run is stopped, as it is by a file called `stop_file` in the directory.
     """
 
     directory: str
@@ -282,6 +345,7 @@ class Output:
     hdf5: Hdf5 = "mpi-io"
     restart_every: float = 0.0
     stop_file: str = "stop"
+    restart_at_end: bool = True
 
 
 @dataclass(frozen=True)

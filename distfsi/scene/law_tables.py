@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, g
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from distfsi.coordinates import Coordinates
 from distfsi.gauges import Gauge
 from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
@@ -74,6 +75,7 @@ SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
 SourceInput = choice(Source)
 GaugeInput: Any = choice(Gauge)
+SymmetryWord: Any = Literal[tuple(word_of(kind) for kind in laws_of(Coordinates))]  # a file, a word
 _StrengthTable: Any = choice(Strength)
 StrengthInput = Annotated[
     _StrengthTable, BeforeValidator(_word_as_table, json_schema_input_type=_StrengthTable | Literal["none"])

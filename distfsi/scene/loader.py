@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from distfsi.errors import InputError
-from distfsi.scene import build, checks, materials
+from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.description import Scene, Shape
 from distfsi.scene.diagnosis import diagnose
@@ -31,14 +31,15 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     text, data = _read(file)
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
+    uncharged, charged = charges.add_charges(data)
     unnamed, incomplete = materials.fill(data)
     sections, invalid = validate(data, str(file.parent))
     scene, crossed = _assemble(sections, data, file.stem)
-    faults += unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
+    faults += uncharged + unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:
         raise InputError(locations.tell(faults))
-    return replace(scene, notes=tuple(locations.tell([*notes, *_open_surfaces(scene)])))
+    return replace(scene, notes=tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)])))
 
 
 @cache

@@ -24,6 +24,7 @@ from distfsi.scene.law_tables import FailureInput, PhaseInput, SolidEosInput, St
 from distfsi.scene.units import to_si
 
 ABOUT = ("source", "checked", "range", "caveat")  # what a part says of itself
+ATMOSPHERE = 101325.0  # [Pa]
 SOLID_PARTS = ("eos", "strength", "failure")
 
 
@@ -77,6 +78,12 @@ class Material:
         if explosive is not None:
             return {"density": explosive.density, "energy": explosive.energy / explosive.density}
         return dict(self.parts["state"].values)
+
+    @property
+    def unburnt(self) -> dict[str, Any]:
+        """The same of an explosive that has not burnt yet."""
+        explosive = self.detonation
+        return self.state if explosive is None else {"density": explosive.density, "pressure": ATMOSPHERE}
 
 
 @cache
@@ -135,10 +142,14 @@ def fill(data: Mapping[str, Any]) -> tuple[list[Fault], list[Path]]:
     for path, table in _tables(("fluid", "phases"), fluid.get("phases")):
         faults += _fill_phase(path, table, named)
     incomplete = [fault.path[:-1] for fault in faults]
+    detonation = _table(fluid, "detonation")
+    explosive = str(detonation.get("phase"))
+    if explosive in named:
+        _fill_burn(detonation, named[explosive])
     for path, state in _states(fluid):
         phase = str(state.get("phase"))
         if phase in named:
-            _fill_state(state, named[phase])
+            _fill_state(state, named[phase].unburnt if phase == explosive else named[phase].state)
         elif ("fluid", "phases", phase) in incomplete:
             incomplete.append(path)
     return faults, incomplete
@@ -188,9 +199,17 @@ def _fill_phase(path: Path, table: dict[str, Any], named: dict[str, Material]) -
     return []
 
 
-def _fill_state(state: dict[str, Any], material: Material) -> None:
+def _fill_burn(table: dict[str, Any], material: Material) -> None:
+    given = material.detonation
+    burn = table.setdefault("burn", {})
+    if given is not None and isinstance(burn, dict):
+        values = {"density": given.density, "energy": given.energy / given.density}
+        _complete(burn, {"kind": "programmed", **values, "speed": given.speed, "pressure": given.pressure})
+
+
+def _fill_state(state: dict[str, Any], values: Mapping[str, Any]) -> None:
     given = {"pressure", "energy"} & state.keys()
-    _complete(state, {key: value for key, value in material.state.items() if key == "density" or not given})
+    _complete(state, {key: value for key, value in values.items() if key == "density" or not given})
 
 
 def _fill_body(path: Path, table: dict[str, Any]) -> list[Fault]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Failure, FluidEos, Law, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.loader import schema
@@ -46,6 +46,13 @@ SECTIONS = {
     "`[fluid]`": ("FluidInput",),
     "`[fluid.phases.NAME]`": ("NamedPhase", *_names(FluidEos)),
     "`[[fluid.regions]]`": ("RegionInput",),
+    "`[fluid.detonation]`": ("DetonationInput",),
+    "`burn` of the detonation": _names(Burn),
+    "`[[fluid.detonation.detonators]]`": ("PointDetonator", "LineDetonator", "PlaneDetonator"),
+    "`[[charges]]`": ("ChargeInput",),
+    "`[fluid.afterburn]`": ("AfterburnSectionInput",),
+    "`law` of the afterburn": _names(Afterburn),
+    "`[fluid.map]`": ("MapInput",),
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),

@@ -10,7 +10,16 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
-from distfsi.scene.law_tables import FailureInput, GaugeInput, SolidEosInput, SourceInput, StrengthInput
+from distfsi.scene.charges import ChargeInput
+from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
+from distfsi.scene.law_tables import (
+    FailureInput,
+    GaugeInput,
+    SolidEosInput,
+    SourceInput,
+    StrengthInput,
+    SymmetryWord,
+)
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.values import (
@@ -47,6 +56,12 @@ class DomainInput(Table):
     x: Ends = OUTFLOW
     y: Ends = OUTFLOW
     z: Ends = OUTFLOW
+    symmetry: SymmetryWord = Field(
+        "planar",
+        description='what turns about an axis or a point: "axisymmetric" (2D): x is the distance r from an axis, y the '
+        'place z along it; "cylindrical", "spherical" (1D): x is the distance r from an axis or a point. Totals are of '
+        'the whole turn, in "cylindrical" per metre along the axis. The end at r = 0 has the kind "axis"',
+    )
     gravity: Acceleration | None = Field(None, description="acceleration of everything; default none")
 
 
@@ -108,6 +123,15 @@ class InflowInput(Table):
     z_high: StateInput | None = None
 
 
+class MapInput(Table):
+    """The end of another run, in radial coordinates, as the start of this one: over the first region, under the others.
+    Time goes on from there."""
+
+    run: str = Field(description="output directory of a finished run, or a restart file")
+    center: Position | None = Field(None, description="where its r = 0 (and z = 0) lies; default the origin")
+    axis: Literal["x", "y", "z"] = Field("z", description="3D: along which axis its own lies")
+
+
 class FluidInput(Table):
     """The compressible flow of one or two phases, numbered in order of appearance."""
 
@@ -115,6 +139,7 @@ class FluidInput(Table):
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    map: MapInput | None = Field(None, description="`[fluid.map]`: goes on from another run")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: description.Reconstruction = Field(
         "minmod", description="slopes of MUSCL, or curves through five cells; volume fractions then by van_leer"
@@ -126,6 +151,10 @@ class FluidInput(Table):
     model: description.TwoPhaseModel = Field(
         "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
     )
+    detonation: DetonationInput | None = Field(
+        None, description="how the explosive burns and what lights it; default: its regions are given burnt"
+    )
+    afterburn: AfterburnSectionInput | None = Field(None, description="how its products burn with air; default not")
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
         1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
     )
@@ -272,10 +301,13 @@ class OutputInput(Table):
         description='who writes: all ranks by MPI-IO, all ranks by an h5py with MPI ("mpio"), or rank 0 ("gather")',
     )
     restart_every: quantity("s", ge=0.0) = Field(
-        1800.0, description="computing time between restart files, of which two are kept; 0: only when stopped early"
+        1800.0, description="computing time between restart files, of which two are kept; 0: only at the end"
     )
-    stop_file: str | None = Field(
-        None, description="a file that, when it appears, stops the run early; default: stop in the output directory"
+    restart_at_end: bool = Field(
+        True, strict=True, description="write a restart file at the end, from which the run can be extended"
+    )
+    stop_file: str = Field(
+        "stop", description="a file in the output directory that, when it appears, stops the run early"
     )
 
 
@@ -321,6 +353,7 @@ class Sections(Table):
     domain: DomainInput | None = None
     time: TimeInput | None = None
     fluid: FluidInput | None = None
+    charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
     output: OutputInput = OutputInput()

@@ -32,30 +32,22 @@ def distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     It is the true one where `has_true_distance` says so, otherwise a bound: of the right sign, and nowhere farther from
     zero.
     """
-    if isinstance(shape, Box | Cylinder):
-        return meet(*surfaces(shape, points).T)
-    return surfaces(shape, points).max(axis=1)
-
-
-def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k). A
-    composed one counts as one."""
     match shape:
         case Box(lower, upper):
-            return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
+            return meet(*np.maximum(np.asarray(lower) - points, points - np.asarray(upper)).T)
         case Ball(center, radius):
-            return (_radius(points, center) - radius)[:, None]
+            return _radius(points, center) - radius
         case HalfSpace(point, normal):
-            return ((points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal))[:, None]
+            return (points - np.asarray(point)) @ np.asarray(normal) / math.hypot(*normal)
         case Tube(center, inner, outer):
             r = _radius(points, center)
-            return np.stack([inner - r, r - outer], axis=1)
+            return np.maximum(inner - r, r - outer)
         case Cylinder(start, end, outer, inner):
             along, r = cylinder_coordinates(shape, points)
-            hole = [inner - r] if inner > 0.0 else []
-            return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
+            ends = np.maximum(-along, along - math.dist(start, end))
+            return meet(ends, np.maximum(inner - r, r - outer) if inner > 0.0 else r - outer)
         case Composed():
-            return shape.distance(points)[:, None]
+            return shape.distance(points)
 
 
 def meet(*distances: np.ndarray) -> np.ndarray:
@@ -68,6 +60,22 @@ def meet(*distances: np.ndarray) -> np.ndarray:
 def has_true_distance(shape: Shape) -> bool:
     """Whether `distance` is the true one, and not a bound."""
     return shape.exact if isinstance(shape, Composed) else True
+
+
+def surfaces(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Signed distances [m] of `points` (n, D) to each of the smooth surfaces of `shape`, negative inside -> (n, k); of
+    a composed one to its surface as a whole."""
+    match shape:
+        case Box(lower, upper):
+            return np.hstack([np.asarray(lower) - points, points - np.asarray(upper)])
+        case Tube(center, inner, outer):
+            r = _radius(points, center)
+            return np.stack([inner - r, r - outer], axis=1)
+        case Cylinder(start, end, outer, inner):
+            along, r = cylinder_coordinates(shape, points)
+            hole = [inner - r] if inner > 0.0 else []
+            return np.stack([-along, along - math.dist(start, end), *hole, r - outer], axis=1)
+    return distance(shape, points)[:, None]
 
 
 def cylinder_coordinates(shape: Cylinder, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,11 @@ from distfsi.mesh.particles import ParticleExchange
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
 from distfsi.scene.motion import Motion
+from distfsi.solid.contact import Contact
 from distfsi.solid.neighbours import Near
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.solid import Solid
+from distfsi.solid.walls import Walls
 
 REFERENCE = "reference"  # [m] of the points at the start
 
@@ -64,12 +67,12 @@ class Obstacles(Solid):
         self._time = 0.0
         super().__init__(scene, *parts)
 
-    def _begin(self, scene: Scene) -> None:
-        self.form = NoForces()
+    def _begin(self, scene: Scene) -> tuple[SolidForm, Sequence[Contact | Walls]]:
         self.columns["fixed"] = np.ones(self.count, dtype=bool)
         if not self.stands:
             self.columns[REFERENCE] = self.columns["position"].copy()
         self._hold()
+        return NoForces(), ()
 
     def _hold(self) -> None:
         """The step begins here."""

@@ -8,6 +8,7 @@ forces at x^n take v^(n-1/2) to v^(n+1/2), which strains and moves the particles
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
 from distfsi.solid import contact, fields, neighbours, pieces, total_lagrangian, updated, walls
+from distfsi.solid.contact import Contact
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.interactions import contacts_of, form_of
 from distfsi.solid.kernels import motion
@@ -33,7 +35,9 @@ from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near
 from distfsi.solid.packed import packed
+from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
+from distfsi.solid.walls import Walls
 
 DRIVERS = (
     *particle_kernels.EXCHANGE,
@@ -103,18 +107,19 @@ class Solid:
         c = self._own_particles(scene)
         self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
-        self._begin(scene)
+        self.form, self._contacts = self._begin(scene)
 
-    def _begin(self, scene: Scene) -> None:
-        """Collective. What materials find before the first step, and how particles act on each other."""
+    def _begin(self, scene: Scene) -> tuple[SolidForm, Sequence[Contact | Walls]]:
+        """Collective. What materials and bonds find before the first step; how particles act on each other, and what
+        bodies run into."""
         self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
         sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
         given = (scene, self.kernels, self.exchange, self.communicator)
-        self.form = form_of(*given, self._points, sides)
-        self.form.bind(self.columns, self.exchange)
-        self._contacts = contacts_of(*given, sides)
-        for each in self._contacts:
-            each.bind(self.columns)
+        form, contacts = form_of(*given, self._points, sides), contacts_of(*given, sides)
+        form.bind(self.columns, self.exchange)
+        for met in contacts:
+            met.bind(self.columns)
+        return form, contacts
 
     def _constants(self) -> dict[str, object]:
         """What the kernels are specialised for."""
@@ -160,15 +165,15 @@ class Solid:
             self.start, self.sub_steps = now, 0
             self.before, self.carried = (device.zeros((own, self.dimensions)) for _ in range(2))
             self._run(self.kernels.average_velocity, 1, *c.read("velocity"), self.before)
-        reach = max(reach, support, *(each.widening * support for each in self._contacts))
+        reach = max(reach, support, *(met.widening * support for met in self._contacts))
         plan = self.exchange.ghosts(now, c["id"], reach + stray, self.form.requested_keys(c), image_reach=reach)
         given = [(now, "position"), (state, parity + self._vector), *self.form.ghost_payload(c)]
         position, state, *payload = plan.exchange(given)
         self._near = Near(plan, position, state, support, payload, flags)
         self._acceleration = device.zeros((own, self.dimensions))
         self._limits = device.empty((own, len(LIMITS)))
-        for each in self._contacts:
-            each.accelerate(c, self._near, self._acceleration)
+        for met in self._contacts:
+            met.accelerate(c, self._near, self._acceleration)
         self.form.accelerate(c, self._near, self._acceleration, self._limits)
 
     def time_step(self) -> tuple[float, str]:
@@ -213,8 +218,8 @@ class Solid:
         (around,) = self.around.plan.exchange([(velocity, self._vector)])
         gradient = device.zeros((self.count, D**2))
         self.form.strain(c, self.around, dt, around, gradient)
-        for each in self._contacts:
-            each.heat(c, self.around, dt, around)
+        for met in self._contacts:
+            met.heat(c, self.around, dt, around)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
         self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)

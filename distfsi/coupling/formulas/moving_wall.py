@@ -105,10 +105,11 @@ def stage_content(U_n, U, v_n, v, D, freed, b, dt):
         a1, p = W[3 + DIMENSIONS], W[2 + DIMENSIONS]
         w1, w2 = a1 * p * growth_of_volume, (1.0 - a1) * p * growth_of_volume
         return (
-            *(transported[k] for k in static_range(VARIABLES - 1)),
+            *(transported[k] for k in static_range(E + 1)),
             Q_n[E + 1] + b * (Q[E + 1] - D[E + 1] + a1 * growth_of_volume - Q_n[E + 1]),
-            Q_n[E + 2] + b * (Q[E + 2] - D[E + 2] - w1 - Q_n[E + 2]),
-            Q_n[E + 3] + b * (Q[E + 3] - D[E + 3] - w2 - Q_n[E + 3]),
+            *(Q_n[v] + b * (Q[v] - D[v] - Q_n[v]) for v in static_range(E + 2, VARIABLES)),
+            Q_n[VARIABLES] + b * (Q[VARIABLES] - D[VARIABLES] - w1 - Q_n[VARIABLES]),
+            Q_n[VARIABLES + 1] + b * (Q[VARIABLES + 1] - D[VARIABLES + 1] - w2 - Q_n[VARIABLES + 1]),
         )
 
 
@@ -117,7 +118,13 @@ def state_before_relaxation(Q, volume):
     U = tuple(Q[v] / volume for v in static_range(VARIABLES))
     a1 = min(max(U[3 + DIMENSIONS], MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
     a2 = 1.0 - a1
-    W = primitives((*(U[v] for v in static_range(VARIABLES - 1)), a1))
+    W = primitives(
+        (
+            *(U[v] for v in static_range(3 + DIMENSIONS)),
+            a1,
+            *(U[v] for v in static_range(4 + DIMENSIONS, VARIABLES)),
+        )
+    )
     p = W[2 + DIMENSIONS]
     ref1, slope1 = reference_1(W[0])
     ref2, slope2 = reference_2(W[1])
@@ -136,7 +143,12 @@ def state_of(Q, volume):
         U, phases = state_before_relaxation(Q, volume)
         change, settled = relaxed_fraction_change(phases)
         a1 = min(max(phases[1] + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-        return (*(U[v] for v in static_range(VARIABLES - 1)), a1, settled)
+        return (
+            *(U[v] for v in static_range(3 + DIMENSIONS)),
+            a1,
+            *(U[v] for v in static_range(4 + DIMENSIONS, VARIABLES)),
+            settled,
+        )
 
 
 def normal_of(area):

@@ -20,9 +20,11 @@ from distfsi.fluid.formulas.six_equation import (
 from distfsi.fluid.formulas.stiffness import weight_1, weight_2
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
+    CARRIER,
     DIMENSIONS,
     FLUXES,
     MINIMUM_FRACTION,
+    VARIABLES,
     grueneisen_1,
     grueneisen_2,
     reference_1,
@@ -67,6 +69,10 @@ def behind_wave(W, s, u_face):
         *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
         energy,
         a1,
+        *(
+            chi * ((a1 * W[0] if CARRIER == 0 else (1.0 - a1) * W[1]) * W[v])
+            for v in static_range(4 + DIMENSIONS, VARIABLES)
+        ),
         1.0,
     )
 
@@ -77,4 +83,8 @@ def updated(U_n, U, W, D, b, dt):
     change = b * (a1 - D[3 + DIMENSIONS] + a1 * D[FLUXES - 1] - a1_n)
     a1_new = min(max(a1_n + change, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
     new = updated_conserved(U_n, U, D, b, dt)
-    return (*(new[v] for v in static_range(3 + DIMENSIONS)), a1_new)
+    return (
+        *(new[v] for v in static_range(3 + DIMENSIONS)),
+        a1_new,
+        *(U_n[v] + b * (U[v] - D[v] - U_n[v]) for v in static_range(4 + DIMENSIONS, VARIABLES)),
+    )

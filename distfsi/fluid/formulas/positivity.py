@@ -12,6 +12,7 @@ from distfsi.formulas.symbols import (
     FLUXES,
     MINIMUM_FRACTION,
     PHASES,
+    VARIABLES,
     bulk_modulus,
     conserved,
     face_flux,
@@ -64,7 +65,13 @@ def margins(W, F, rate):
     else:
         a1 = W[3 + DIMENSIONS] - rate * (F[3 + DIMENSIONS] - W[3 + DIMENSIONS] * F[FLUXES - 1])
         a1 = min(max(a1, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)
-        after = primitives((*(new[v] for v in static_range(PHASES + DIMENSIONS + 1)), a1))
+        after = primitives(
+            (
+                *(new[v] for v in static_range(PHASES + DIMENSIONS + 1)),
+                a1,
+                *(U[v] - rate * (F[v] - U[v] * u) for v in static_range(4 + DIMENSIONS, VARIABLES)),
+            )
+        )
     spared = bulk_modulus(after) - FLOOR * bulk_modulus(W)
     return (*(new[k] - FLOOR * U[k] for k in static_range(PHASES)), spared)
 

@@ -24,6 +24,22 @@ def muscl(cells):
     return (increment, increment)
 
 
+def muscl_in_r(cells, nearness_backward, nearness_forward, to_low):
+    """A straight line with a limited slope through means that stand for the centroids of cells (Mignone, J. Comput.
+    Phys. 270, 2014), within the range of the neighbours.
+
+    nearness: width of the cell over the distance of the centroids; to_low: widths from the low face to the centroid.
+    """
+    backward, forward = differences(cells)
+    slope = limited_slope(backward * nearness_backward, forward * nearness_forward)
+    return (bounded(to_low * slope, backward), bounded((1.0 - to_low) * slope, forward))
+
+
+def bounded(increment, difference):
+    """An increment that goes no farther than a difference of the same sign."""
+    return increment if abs(increment) <= abs(difference) else difference
+
+
 def overbee(cells):
     """The steepest straight line within the range of the neighbours, flat at extrema (Chiapolino, Saurel, Nkonga, J.
     Comput. Phys. 340, 2017). A steeper profile, as THINC's can be, could empty a cell of a phase in one step."""

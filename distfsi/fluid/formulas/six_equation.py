@@ -1,8 +1,10 @@
 """The six-equation model of two compressible materials with one velocity and, after relaxation, one pressure.
 
 Stored state U = (a1 rho1, a2 rho2, rho u (DIMENSIONS), rho E, a1); primitive state W = (rho1, rho2, u (DIMENSIONS), p,
-a1). Phase energies live inside a stage and are reset from rho E (Saurel, Petitpas, Berry, J. Comput. Phys. 228, 2009;
-paper, Eqs. 9-30). At faces the velocity components are rotated so that the normal one comes first.
+a1). Behind them may stand shares that a phase carries along, in U times its mass, in W alone; each holds back an energy
+from the pressure (fluid/reactions.py). Phase energies live inside a stage and are reset from rho E (Saurel, Petitpas,
+Berry, J. Comput. Phys. 228, 2009; paper, Eqs. 9-30). At faces the velocity components are rotated so that the normal
+one comes first.
 """
 
 from math import sqrt
@@ -13,9 +15,12 @@ from distfsi.fluid.formulas.stiffness import held_compression_1, held_compressio
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
     BODY_FORCE,
+    CARRIED,
+    CARRIER,
     CLOSED_FORM,
     DIMENSIONS,
     FLUXES,
+    HELD_ENERGY,
     MINIMUM_FRACTION,
     VARIABLES,
     bounding_speeds,
@@ -44,9 +49,17 @@ def primitives(U):
     reference2, slope2 = stored_reference_2(rho2)
     omega1, omega_slope1 = grueneisen_1(rho1)
     omega2, omega_slope2 = grueneisen_2(rho2)
-    energy = U[2 + DIMENSIONS] - kinetic + a1 * (reference1 / omega1) + a2 * (reference2 / omega2)
+    held = sum(HELD_ENERGY[n] * U[4 + DIMENSIONS + n] for n in static_range(CARRIED))
+    energy = U[2 + DIMENSIONS] - held - kinetic + a1 * (reference1 / omega1) + a2 * (reference2 / omega2)
     p = energy / (a1 * (1.0 / omega1) + a2 * (1.0 / omega2))
-    return (rho1, rho2, *(velocity[d] for d in static_range(DIMENSIONS)), p, a1)
+    return (
+        rho1,
+        rho2,
+        *(velocity[d] for d in static_range(DIMENSIONS)),
+        p,
+        a1,
+        *(U[v] / U[CARRIER] for v in static_range(4 + DIMENSIONS, VARIABLES)),
+    )
 
 
 def conserved(W):
@@ -54,7 +67,14 @@ def conserved(W):
     a1 = W[3 + DIMENSIONS]
     m1 = a1 * W[0]
     m2 = (1.0 - a1) * W[1]
-    return (m1, m2, *((m1 + m2) * W[2 + d] for d in static_range(DIMENSIONS)), total_energy(W), a1)
+    return (
+        m1,
+        m2,
+        *((m1 + m2) * W[2 + d] for d in static_range(DIMENSIONS)),
+        total_energy(W),
+        a1,
+        *((m1 if CARRIER == 0 else m2) * W[v] for v in static_range(4 + DIMENSIONS, VARIABLES)),
+    )
 
 
 def total_energy(W):
@@ -68,7 +88,11 @@ def total_energy(W):
     omega2, omega_slope2 = grueneisen_2(W[1])
     internal = a1 * ((p - reference1) / omega1) + a2 * ((p - reference2) / omega2)
     squared = sum(W[2 + d] * W[2 + d] for d in static_range(DIMENSIONS))
-    return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared
+    held = sum(
+        HELD_ENERGY[n] * ((a1 * W[0] if CARRIER == 0 else a2 * W[1]) * W[4 + DIMENSIONS + n])
+        for n in static_range(CARRIED)
+    )
+    return internal + 0.5 * (a1 * W[0] + a2 * W[1]) * squared + held
 
 
 def phase_energies(W):
@@ -145,6 +169,7 @@ def behind_wave(W, s, u_face):
         *(mass * W[2 + d] for d in static_range(1, DIMENSIONS)),
         energy,
         a1,
+        *((mass1 if CARRIER == 0 else mass2) * W[v] for v in static_range(4 + DIMENSIONS, VARIABLES)),
         a1 * energy_behind_wave(p, chi1, omega1b / omega1 * (p - before1), behind1, omega1b),
         a2 * energy_behind_wave(p, chi2, omega2b / omega2 * (p - before2), behind2, omega2b),
         1.0,
@@ -255,7 +280,11 @@ def updated(U_n, U, W, D, b, dt):
     phases, da = before_relaxation(U_n, U, W, D, b, dt)
     relaxed, settled = relaxed_fraction_change(phases)
     new = updated_conserved(U_n, U, D, b, dt)
-    state = (*(new[v] for v in static_range(3 + DIMENSIONS)), fraction_after(U_n, da + relaxed))
+    state = (
+        *(new[v] for v in static_range(3 + DIMENSIONS)),
+        fraction_after(U_n, da + relaxed),
+        *(U_n[v] + b * (U[v] - D[v] - U_n[v]) for v in static_range(4 + DIMENSIONS, VARIABLES)),
+    )
     if CLOSED_FORM:
         return state
     else:

@@ -8,11 +8,21 @@ so that the normal one comes first.
 from typing import Any, NamedTuple
 
 from distfsi.device.markers import helper
-from distfsi.formulas.symbols import DIMENSIONS, PHASES
+from distfsi.formulas.symbols import DIMENSIONS, PHASES, VARIABLES
 
 # Columns of the table of tiles: the block, the first cell (counted with ghosts), the cells, which domain sides the tile
 # touches (bits).
 BLOCK, X0, Y0, Z0, NX, NY, NZ, SIDES = range(8)
+
+# Rows of the metrics, of each column of cells along the first axis, h being their width:
+#   LOW, HIGH  area of its low and of its high face, in volumes/h
+#   VOLUME     over that of a planar cell
+#   NEARNESS   h over the distance of its centroid from that of the column before
+#   TO_LOW     from the low face to the centroid, in h
+#   STRETCH    area of its low face in volumes/h of the smaller of the two cells there
+#   UNIT       1, as STRETCH of faces along the other axes
+METRICS = 7
+LOW, HIGH, VOLUME, NEARNESS, TO_LOW, STRETCH, UNIT = range(METRICS)
 
 
 class States(NamedTuple):
@@ -38,6 +48,7 @@ class Tiles(NamedTuple):
     stages   (tiles + 1,) for how many stages in a row each has not changed; counted here
     through  (tiles, 6, conserved) what has left through the domain's sides, per area of a face
     limited  (tiles,) faces at the low sides of its cells whose flux was limited
+    metrics  (blocks, METRICS, X) of each column of cells, if coordinates are RADIAL
     spacing  (blocks, 3) size of the cells of each block [m]
     """
 
@@ -46,6 +57,7 @@ class Tiles(NamedTuple):
     stages: Any
     through: Any
     limited: Any
+    metrics: Any
     spacing: Any
 
 
@@ -143,3 +155,10 @@ def position_of(variable, axis):
     if variable >= PHASES and variable < PHASES + DIMENSIONS:
         return PHASES + (variable - PHASES + DIMENSIONS - axis) % DIMENSIONS
     return variable
+
+
+@helper
+def metrics_at(row, cell, variables, rows):
+    """Index in P of a row of the metrics, at the column of P[cell]: they lie behind a tile's primitives, whose rows of
+    cells have so many columns."""
+    return VARIABLES * variables + row * rows + cell % rows

@@ -4,7 +4,22 @@ These are the loops that must vectorise (`@row`); what P, T and F hold is told i
 """
 
 from distfsi.device.markers import helper, int32, load, row, store
-from distfsi.fluid.kernels.records import CellFluxes, Cells, Faces, StageStep, States, position_of, variable_at
+from distfsi.fluid.kernels.records import (
+    HIGH,
+    LOW,
+    NEARNESS,
+    STRETCH,
+    TO_LOW,
+    UNIT,
+    CellFluxes,
+    Cells,
+    Faces,
+    StageStep,
+    States,
+    metrics_at,
+    position_of,
+    variable_at,
+)
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
     ASYMMETRIC,
@@ -14,6 +29,7 @@ from distfsi.formulas.symbols import (
     FRACTIONAL,
     GHOSTS,
     PHASES,
+    RADIAL,
     SHARPENED,
     TRANSVERSE_SENSOR,
     VARIABLES,
@@ -27,6 +43,7 @@ from distfsi.formulas.symbols import (
     primitives,
     range_of_change,
     reconstructed,
+    reconstructed_in_r,
     sharpened,
     sound_speed,
     updated,
@@ -62,10 +79,25 @@ def increments_row(P, T, p, sp, step, t, st, n):
         for i in range(n):
             c = p + v * sp + i
             cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
-            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else reconstructed(cells)
+            low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
             store(T, t + v * st + i, high)
             if ASYMMETRIC:
                 store(T, t + low_increment(v) * st + i, low)
+
+
+@row
+def increments_in_r_row(P, T, p, sp, t, st, n):
+    """As `increments_row` along r, where centroids do not lie in the middle of cells, and not equally far apart."""
+    nearness, to_low = metrics_at(NEARNESS, p, sp, st), metrics_at(TO_LOW, p, sp, st)
+    for v in static_range(VARIABLES):
+        for i in range(n):
+            c = p + v * sp + i
+            cells = tuple(load(P, c + k) for k in static_range(1 - GHOSTS, GHOSTS))
+            backward, forward = load(P, nearness + i), load(P, nearness + i + 1)
+            along = reconstructed_in_r(cells, backward, forward, load(P, to_low + i))
+            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else along
+            store(T, t + v * st + i, high)
+            store(T, t + low_increment(v) * st + i, low)
 
 
 # ---- the transverse pressure sensor ----------------------------------------------------------------------------------
@@ -104,6 +136,16 @@ def cell_mean(P, c, faces: Faces):
     return tuple(load(P, c + variable_at(v, faces.axis) * faces.variables) for v in static_range(VARIABLES))
 
 
+@helper
+def rate_of_face(P, i, faces: Faces):
+    """What the limiter takes for the rate of face i of a row: in r that of the cell which has more face for its
+    volume."""
+    if RADIAL:
+        row = STRETCH if faces.axis == 0 else UNIT
+        return faces.rate * load(P, metrics_at(row, faces.cell + faces.across, faces.variables, faces.rows) + i)
+    return faces.rate
+
+
 @row
 def flux_row(P, T, F, faces: Faces, n):
     """F = flux through the n faces, and behind it the indicator that tells whether the limiter must look at it; returns
@@ -127,7 +169,7 @@ def flux_row(P, T, F, faces: Faces, n):
         c = min(sound_speed(left), sound_speed(right))
         if ASYMMETRIC:  # then a cell's mean may have a much lower one
             c = min(c, min(sound_speed(low), sound_speed(high)))
-        indicator = limiter_indicator(low, high, flux, c, faces.rate)
+        indicator = limiter_indicator(low, high, flux, c, rate_of_face(P, i, faces))
         store(F, faces.flux + FLUXES * faces.rows + i, indicator)
         count = int32(count + (1 if indicator < 0.0 else 0))
     return count
@@ -151,8 +193,9 @@ def limit_faces(P, F, faces: Faces, n, counted):
     while i < n:
         low, high = cell_mean(P, faces.cell + i, faces), cell_mean(P, faces.cell + faces.across + i, faces)
         flux = tuple(load(F, faces.flux + v * faces.rows + i) for v in static_range(FLUXES))
-        if not is_admissible(low, high, flux, faces.rate):
-            limited = limited_flux(low, high, flux, jump_of_face(P, i, faces), faces.rate)
+        rate = rate_of_face(P, i, faces)
+        if not is_admissible(low, high, flux, rate):
+            limited = limited_flux(low, high, flux, jump_of_face(P, i, faces), rate)
             for v in static_range(FLUXES):
                 store(F, faces.flux + v * faces.rows + i, limited[v])
             count += 1 if i < counted else 0
@@ -172,10 +215,24 @@ def face_fluxes(P, T, F, faces: Faces, n, counted):
 
 
 @helper
-def divergence(F, v, i, fluxes: CellFluxes, step: StageStep):
+def divergence_in_r(P, F, v, i, cells: Cells, fluxes: CellFluxes, step: StageStep):
+    """dt times the part along r of the flux divergence of variable v in cell i of a row. Momentum is pushed by how much
+    the pressure on each face differs from the cell's own, which acts on all of them alike."""
+    x = fluxes.x + v * fluxes.rows + i
+    low = load(P, metrics_at(LOW, cells.primitive, cells.primitive_variables, fluxes.rows) + i)
+    high = load(P, metrics_at(HIGH, cells.primitive, cells.primitive_variables, fluxes.rows) + i)
+    own = load(P, cells.primitive + (PHASES + DIMENSIONS) * cells.primitive_variables + i) if v == PHASES else 0.0
+    return (high * (load(F, x + 1) - own) - low * (load(F, x) - own)) * step.x
+
+
+@helper
+def divergence(P, F, v, i, cells: Cells, fluxes: CellFluxes, step: StageStep):
     """dt times the flux divergence of variable v in cell i of a row."""
     x = fluxes.x + v * fluxes.rows + i
-    total = (load(F, x + 1) - load(F, x)) * step.x
+    if RADIAL:
+        total = divergence_in_r(P, F, v, i, cells, fluxes, step)
+    else:
+        total = (load(F, x + 1) - load(F, x)) * step.x
     if DIMENSIONS > 1:
         y = position_of(v, 1) * fluxes.rows + i
         total = total + (load(F, fluxes.y_high + y) - load(F, fluxes.y_low + y)) * step.y
@@ -186,9 +243,9 @@ def divergence(F, v, i, fluxes: CellFluxes, step: StageStep):
 
 
 @helper
-def change_by_fluxes(F, volumes, i, cells: Cells, fluxes: CellFluxes, step: StageStep):
+def change_by_fluxes(P, F, volumes, i, cells: Cells, fluxes: CellFluxes, step: StageStep):
     """dt times the flux divergence of all variables in cell i of a row, per volume of its fluid."""
-    D = tuple(divergence(F, v, i, fluxes, step) for v in static_range(FLUXES))
+    D = tuple(divergence(P, F, v, i, cells, fluxes, step) for v in static_range(FLUXES))
     if FRACTIONAL:
         concentration = 1.0 / max(load(volumes, cells.volume + i), MINIMUM_VOLUME)
         return tuple(D[v] * concentration for v in static_range(FLUXES))
@@ -219,7 +276,7 @@ def update_row(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step: 
             state_of_cell(states.before, i, cells),
             state_of_cell(states.now, i, cells),
             primitives_of_cell(P, i, cells),
-            change_by_fluxes(F, states.volumes, i, cells, fluxes, step),
+            change_by_fluxes(P, F, states.volumes, i, cells, fluxes, step),
             step.b,
             step.dt,
         )
@@ -241,7 +298,7 @@ def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step
             before,
             state_of_cell(states.now, i, cells),
             primitives_of_cell(P, i, cells),
-            change_by_fluxes(F, states.volumes, i, cells, fluxes, step),
+            change_by_fluxes(P, F, states.volumes, i, cells, fluxes, step),
             step.b,
             step.dt,
         )
@@ -249,7 +306,7 @@ def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step
         for _ in range(HALVINGS):
             low, high = halved_range(phases, low, high)
         fraction = fraction_after(before, moved + 0.5 * (low + high))
-        store(states.after, cells.state + (VARIABLES - 1) * cells.state_variables + i, fraction)
+        store(states.after, cells.state + (PHASES + DIMENSIONS + 1) * cells.state_variables + i, fraction)
         i = next_negative(T, 0, i + 1, n)
 
 

@@ -1,7 +1,7 @@
 // The loops of fluid/kernels/stage.py and signals.py for a GPU: the same steps, one block of threads per tile, one thread per column of cells.
 //
-// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, BISECTION_FALLBACK, ASYMMETRIC, SHARPENED, TRANSVERSE_SENSOR; the formulas by their
-// names, whose first argument are the `numbers` of the scene, NUMBERS; and for the stage
+// Defined above: DIMENSIONS, PHASES, VARIABLES, FLUXES, GHOSTS, BISECTION_FALLBACK, ASYMMETRIC, SHARPENED, RADIAL, SHARES, TRANSVERSE_SENSOR; the
+// formulas by their names, whose first argument are the `numbers` of the scene, NUMBERS; and for the stage
 // TILE_X, TILE_Y (cells of a whole tile across the block's threads), THREADS, SHARED (values of shared memory).
 
 // ---- tuples and arrays ------------------------------------------------------------------------------------------------
@@ -79,30 +79,53 @@ template <int AXIS> DEVICE real jump_along_face(const real *p, int i, int j, int
     return jump;
 }
 
+// rows of the metrics, as in records.py
+enum { LOW, HIGH, VOLUME, NEARNESS, TO_LOW, STRETCH };
+
+// The metrics of a tile's columns of cells, from its first one on; rows are `size` apart.
+struct Metrics {
+    const real *values;
+    long long size;
+    __device__ __forceinline__ real operator()(int row, int i) const { return values[row * size + i]; }
+};
+
+// Area of face i of a row on a domain side, over that of a planar face; nx: cells of the tile along x.
+template <int SIDE> DEVICE real face_size(Metrics metrics, int nx, int i)
+{
+    if constexpr (SIDE == 0) return metrics(LOW, 0) * metrics(VOLUME, 0);
+    if constexpr (SIDE == 1) return metrics(HIGH, nx - 1) * metrics(VOLUME, nx - 1);
+    return metrics(VOLUME, i);
+}
+
 // Increments of a variable from the low face of a cell to its mean and from there to its high face.
-template <int AXIS> DEVICE auto increments(const auto &numbers, const real *W, bool sharp, int i, int j, int k)
+template <int AXIS> DEVICE auto increments(const auto &numbers, const real *W, Metrics metrics, bool sharp, int i, int j, int k)
 {
     real values[2 * GHOSTS - 1];
 #pragma unroll
     for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = W[cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
     const auto cells = tuple_of<2 * GHOSTS - 1>(values);
-    return SHARPENED && sharp ? sharpened(numbers, cells) : reconstructed(numbers, cells);
+    if constexpr (RADIAL && AXIS == 0) {
+        const auto along = reconstructed_in_r(numbers, cells, metrics(NEARNESS, i), metrics(NEARNESS, i + 1), metrics(TO_LOW, i));
+        return SHARPENED && sharp ? sharpened(numbers, cells) : along;
+    } else
+        return SHARPENED && sharp ? sharpened(numbers, cells) : reconstructed(numbers, cells);
 }
 
 // Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
 // cell * dt/h. Whether it was limited.
 template <int AXIS>
-DEVICE bool flux(const auto &numbers, const real *P, int i, int j, int k, real rate, real *F, int step)
+DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int j, int k, real rate, real *F, int step)
 {
+    if constexpr (RADIAL && AXIS == 0) rate = rate * metrics(STRETCH, i + 1);
     real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
     const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
         const real *W = P + variable_at(v, AXIS) * SP;
-        const bool sharp = v == VARIABLES - 1;
+        const bool sharp = v == PHASES + DIMENSIONS + 1;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + item<1>(increments<AXIS>(numbers, W, sharp, i, j, k));
-        right[v] = W[high] - item<0>(increments<AXIS>(numbers, W, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+        left[v] = W[low] + item<1>(increments<AXIS>(numbers, W, metrics, sharp, i, j, k));
+        right[v] = W[high] - item<0>(increments<AXIS>(numbers, W, metrics, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
     if constexpr (TRANSVERSE_SENSOR) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
@@ -146,17 +169,24 @@ DEVICE bool is_unlike(const real *U, const real *first, int n, int m, int l, int
     return false;
 }
 
-// Add the flux through n faces of a domain side, `step` apart, to what has left through it; and that of as many `rows`
+// Add the flux through n faces of domain side SIDE, `step` apart, to what has left through it; and that of as many `rows`
 // as are alike. Always in the same order.
-DEVICE void account(double *through, const real *F, int axis, int step, int n, int rows, double weight)
+template <int SIDE>
+DEVICE void account(double *through, const real *F, Metrics metrics, int nx, int step, int n, int rows, double weight)
 {
     for (int v = threadIdx.x; v < CONSERVED; v += THREADS) {
-        const real *values = F + position_of(v, axis) * FACES;
+        const real *values = F + position_of(v, SIDE / 2) * FACES;
         real total = values[0];
+        if constexpr (RADIAL) total = total * face_size<SIDE>(metrics, nx, 0);
 #pragma unroll 1
-        for (int i = 1; i < n; i++) total = total + values[i * step];
+        for (int i = 1; i < n; i++) {
+            if constexpr (RADIAL)
+                total = total + values[i * step] * face_size<SIDE>(metrics, nx, i);
+            else
+                total = total + values[i * step];
+        }
 #pragma unroll 1
-        for (int row = 0; row < rows; row++) through[v] += total * weight;
+        for (int row = 0; row < rows; row++) through[SIDE * CONSERVED + v] += total * weight;
     }
 }
 
@@ -177,7 +207,7 @@ template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> befor
         auto range = range_of_change(numbers, item<0>(start));
 #pragma unroll 1
         for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
-        U_new[(VARIABLES - 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+        U_new[(PHASES + DIMENSIONS + 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
     }
 }
 
@@ -198,7 +228,10 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     const real dt = real(times_dt), step_x = real(times_dt / h[0]), step_y = real(times_dt / h[1]), step_z = real(times_dt / h[2]);
     const long long u0 = tile[BLOCK] * VARIABLES * su + tile[Z0] * sz + tile[Y0] * sy + tile[X0];
 
-    // whether all cells that the tile reads hold one state
+    Metrics metrics = {tiles_metrics, tiles_metrics_2};
+    if constexpr (RADIAL) metrics.values += tile[BLOCK] * tiles_metrics_1 * tiles_metrics_2 + tile[X0];
+
+    // whether a stage does the same to all cells of the tile
     const bool is_calm = tiles_calm[t];
     bool uniform = is_calm;
     if (!is_calm) {
@@ -206,6 +239,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         const bool unlike = is_unlike(corner, corner, nx + 2 * GHOSTS, ny + 2 * GY, nz + 2 * GZ, tx, ty, sy, sz, su)
                             || is_unlike(states_before + u0, states_before + u0, nx, ny, nz, tx, ty, sy, sz, su);
         uniform = __syncthreads_count(unlike) == 0;
+        if constexpr (RADIAL) uniform = uniform && states_now[u0 + PHASES * su] == 0;
     }
 
     // what is computed of it, and what it stands for
@@ -216,19 +250,19 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     real own[3 * FLUXES], *const kept = KEPT > 0 ? F + FLUXES * FACES + threadIdx.x : own;
     // what leaves the cell, and the fluxes along z at its low and its high side
     real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
-    const real sides_of_cell = 2 * DIMENSIONS, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
+    const real sides_of_cell = SHARES, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
     // primitives of the first planes, and fluxes through the low side along z
     for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, states_now + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
-        if (inside) count += flux<2>(numbers, P, tx, ty, -1, rz, low, APART);
+        if (inside) count += flux<2>(numbers, P, metrics, tx, ty, -1, rz, low, APART);
         if (sides & 16) {
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
             __syncthreads();
-            for (int j = 0; j < m; j++) account(out + 4 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, times_weight * step_z);
+            for (int j = 0; j < m; j++) account<4>(out, F + j * ROW, metrics, nx, step, nx, z_alike, times_weight * step_z);
         }
         __syncthreads();
     }
@@ -237,25 +271,29 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         // fluxes along x, and the first part of the divergence
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
-                count += flux<0>(numbers, P, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
+                count += flux<0>(numbers, P, metrics, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
         __syncthreads();
         if (inside) {
 #pragma unroll
             for (int v = 0; v < FLUXES; v++) {
                 const real *f = F + v * FACES + ty * ROW + tx;
-                D[v * APART] = (f[1] - f[0]) * step_x;
+                if constexpr (RADIAL) {
+                    const real own = v == PHASES ? P[(PHASES + DIMENSIONS) * SP + cell(tx, ty, k)] : real(0);
+                    D[v * APART] = (metrics(HIGH, tx) * (f[1] - own) - metrics(LOW, tx) * (f[0] - own)) * step_x;
+                } else
+                    D[v * APART] = (f[1] - f[0]) * step_x;
             }
         }
         for (int j = 0; j < m; j++) {
-            if (sides & 1) account(out, F + j * ROW, 0, step, 1, x_alike, times_weight * step_x);
-            if (sides & 2) account(out + CONSERVED, F + j * ROW + n, 0, step, 1, x_alike, times_weight * step_x);
+            if (sides & 1) account<0>(out, F + j * ROW, metrics, nx, step, 1, x_alike, times_weight * step_x);
+            if (sides & 2) account<1>(out, F + j * ROW + n, metrics, nx, step, 1, x_alike, times_weight * step_x);
         }
         // fluxes along y
         if constexpr (DIMENSIONS > 1) {
             __syncthreads();
             if (tx < n)
                 for (int j = ty; j < m + 1; j += TILE_Y)
-                    count += flux<1>(numbers, P, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
+                    count += flux<1>(numbers, P, metrics, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
             __syncthreads();
             if (inside) {
 #pragma unroll
@@ -264,13 +302,13 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                     D[v * APART] = D[v * APART] + (f[ROW] - f[0]) * step_y;
                 }
             }
-            if (sides & 4) account(out + 2 * CONSERVED, F, 1, step, nx, y_alike, times_weight * step_y);
-            if (sides & 8) account(out + 3 * CONSERVED, F + m * ROW, 1, step, nx, y_alike, times_weight * step_y);
+            if (sides & 4) account<2>(out, F, metrics, nx, step, nx, y_alike, times_weight * step_y);
+            if (sides & 8) account<3>(out, F + m * ROW, metrics, nx, step, nx, y_alike, times_weight * step_y);
         }
         // fluxes through the high side along z, which are those of the next plane's low side
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                count += flux<2>(numbers, P, tx, ty, k, rz, high, APART) && k < l - 1;
+                count += flux<2>(numbers, P, metrics, tx, ty, k, rz, high, APART) && k < l - 1;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++)
                     D[v * APART] = D[v * APART] + (high[position_of(v, 2) * APART] - low[position_of(v, 2) * APART]) * step_z;
@@ -282,7 +320,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
                 if (inside)
                     for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = high[v * APART];
                 __syncthreads();
-                for (int j = 0; j < m; j++) account(out + 5 * CONSERVED, F + j * ROW, 2, step, nx, z_alike, times_weight * step_z);
+                for (int j = 0; j < m; j++) account<5>(out, F + j * ROW, metrics, nx, step, nx, z_alike, times_weight * step_z);
             }
         }
         // the new state

@@ -6,11 +6,13 @@ A tile is computed row by row (x fastest), so that its working set stays in the 
     for each row:  increments and fluxes along x; along y and z those of the row before roll forward
                    divergence, Runge-Kutta update and relaxation -> states.after
 
-Where all cells that a tile reads hold the same state, all its cells get the same bits: it is computed as one cell.
+Where all cells that a tile reads hold the same state, all its cells get the same bits: it is computed as one cell. In
+radial coordinates that needs a state without motion along r, too.
 """
 
 from distfsi.device.markers import ByHand, driver, helper, real, workspace
 from distfsi.fluid.kernels.records import (
+    METRICS,
     SIDES,
     Box,
     CellFluxes,
@@ -21,18 +23,26 @@ from distfsi.fluid.kernels.records import (
     States,
     Tiles,
 )
-from distfsi.fluid.kernels.rows import bisect_cells, face_fluxes, increments_row, primitives_row, update_row
+from distfsi.fluid.kernels.rows import (
+    bisect_cells,
+    face_fluxes,
+    increments_in_r_row,
+    increments_row,
+    primitives_row,
+    update_row,
+)
 from distfsi.fluid.kernels.tile import (
     Tile,
     account_faces,
     account_sides,
     cell_of,
     computed,
+    copy_metrics,
     fluxes_in,
     ghosts_y,
     ghosts_z,
-    holds_one_state,
     increments_in,
+    is_alike_everywhere,
     is_unchanged,
     repeat_first_cell,
     row_fluxes,
@@ -42,7 +52,15 @@ from distfsi.fluid.kernels.tile import (
     step_of_tile,
     tile_at,
 )
-from distfsi.formulas.symbols import BISECTION_FALLBACK, DIMENSIONS, GHOSTS, TRANSVERSE_SENSOR, VARIABLES
+from distfsi.formulas.symbols import (
+    BISECTION_FALLBACK,
+    DIMENSIONS,
+    GHOSTS,
+    RADIAL,
+    SHARES,
+    TRANSVERSE_SENSOR,
+    VARIABLES,
+)
 
 # ---- rows of faces ---------------------------------------------------------------------------------------------------
 
@@ -66,7 +84,10 @@ def find_primitives(states: States, tile: Tile, box: Box, P):
 def fluxes_x(tile: Tile, box: Box, step: StageStep, P, T, F, j, k):
     """Fluxes through the faces of row j in plane k along x; returns how many at low sides of cells were limited."""
     n, cell, variables = computed(tile.x, tile), cell_of(j, k, box) - 1, box.x * box.y * box.z
-    increments_row(P, T, cell, variables, 1, increments_in(0, box), box.x, n + 2)
+    if RADIAL:
+        increments_in_r_row(P, T, cell, variables, increments_in(0, box), box.x, n + 2)
+    else:
+        increments_row(P, T, cell, variables, 1, increments_in(0, box), box.x, n + 2)
     faces = Faces(
         cell=cell,
         variables=variables,
@@ -78,7 +99,7 @@ def fluxes_x(tile: Tile, box: Box, step: StageStep, P, T, F, j, k):
         flux=fluxes_in(0, box),
         rows=box.x,
         axis=0,
-        rate=real(2 * DIMENSIONS) * step.x,
+        rate=real(SHARES) * step.x,
     )
     return face_fluxes(P, T, F, faces, n + 1, n)
 
@@ -106,7 +127,7 @@ def fluxes_y(tile: Tile, box: Box, step: StageStep, P, T, F, j, k, counted):
         flux=fluxes_in(slot_y(j), box),
         rows=box.x,
         axis=1,
-        rate=real(2 * DIMENSIONS) * step.y,
+        rate=real(SHARES) * step.y,
     )
     return face_fluxes(P, T, F, faces, computed(tile.x, tile), counted)
 
@@ -135,7 +156,7 @@ def fluxes_z(tile: Tile, box: Box, step: StageStep, P, T, F, j, k, counted):
         flux=fluxes_in(slot_z(j, k, box), box),
         rows=box.x,
         axis=2,
-        rate=real(2 * DIMENSIONS) * step.z,
+        rate=real(SHARES) * step.z,
     )
     return face_fluxes(P, T, F, faces, computed(tile.x, tile), counted)
 
@@ -167,6 +188,8 @@ def advance_cells(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stag
     sides = tiles.table[tile.number, SIDES]
     count = 0
     find_primitives(states, tile, box, P)
+    if RADIAL:
+        copy_metrics(tiles, tile, box, P)
     # the low side along z
     if DIMENSIONS > 2:
         for j in range(m):
@@ -216,6 +239,7 @@ def advance_tile(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stage
 STAGE_FORMULAS = (
     "primitives",
     "reconstructed",
+    "reconstructed_in_r",
     "sharpened",
     "face_flux",
     "sound_speed",
@@ -247,11 +271,11 @@ def stage_block(constants, arguments):
 @driver
 def advance_tiles(begin, end, chosen, tiles: Tiles, states: States, times: StageTimes, box: Box):
     """One Runge-Kutta stage of the tiles chosen[begin:end]; box: cells of a whole tile with ghosts."""
-    P = workspace(VARIABLES * box.x * box.y * box.z)
+    P = workspace(VARIABLES * box.x * box.y * box.z + (METRICS * box.x if RADIAL else 0))
     T, F = workspace(increments_in(slots(box), box)), workspace(fluxes_in(slots(box), box))
     for at in range(begin, end):
         t = chosen[at]
         step = step_of_tile(t, tiles, times)
         seen = tile_at(t, tiles, states, False)
-        tile = tile_at(t, tiles, states, tiles.calm[t] or holds_one_state(states, seen))
+        tile = tile_at(t, tiles, states, tiles.calm[t] or is_alike_everywhere(states, seen))
         advance_tile(states, tiles, tile, box, step, P, T, F)

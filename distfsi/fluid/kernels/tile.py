@@ -7,13 +7,17 @@ plane, which take turns at its low and high faces along z.
 
 from typing import NamedTuple
 
-from distfsi.device.markers import helper, load, real
+from distfsi.device.markers import helper, load, real, store
 from distfsi.fluid.kernels.records import (
     BLOCK,
+    HIGH,
+    LOW,
+    METRICS,
     NX,
     NY,
     NZ,
     SIDES,
+    VOLUME,
     X0,
     Y0,
     Z0,
@@ -23,11 +27,12 @@ from distfsi.fluid.kernels.records import (
     StageTimes,
     States,
     Tiles,
+    metrics_at,
     position_of,
 )
 from distfsi.fluid.kernels.rows import count_unlike, repeat_row
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import ASYMMETRIC, DIMENSIONS, FLUXES, GHOSTS, PHASES, VARIABLES
+from distfsi.formulas.symbols import ASYMMETRIC, DIMENSIONS, FLUXES, GHOSTS, PHASES, RADIAL, VARIABLES
 
 
 class Tile(NamedTuple):
@@ -146,6 +151,15 @@ def row_fluxes(j, k, box: Box):
     )
 
 
+@helper
+def copy_metrics(tiles: Tiles, tile: Tile, box: Box, P):
+    """The metrics of a tile's columns of cells, ghosts included, go behind its primitives."""
+    block, first = tiles.table[tile.number, BLOCK], tiles.table[tile.number, X0] - GHOSTS
+    for row in range(METRICS):
+        for i in range(computed(tile.x, tile) + 2 * GHOSTS):
+            store(P, metrics_at(row, i, box.x * box.y * box.z, box.x), tiles.metrics[block, row, first + i])
+
+
 # ---- tiles at rest ---------------------------------------------------------------------------------------------------
 
 
@@ -167,6 +181,15 @@ def holds_one_state(states: States, tile: Tile):
     return is_uniform(states.now, corner, tile.variables, tile.next_z, tile.next_y, x, y, z) and is_uniform(
         states.before, tile.state, tile.variables, tile.next_z, tile.next_y, tile.x, tile.y, tile.z
     )
+
+
+@helper
+def is_alike_everywhere(states: States, tile: Tile):
+    """Whether a stage does the same to all cells of a tile."""
+    alike = holds_one_state(states, tile)
+    if RADIAL:
+        alike = alike and load(states.now, tile.state + PHASES * tile.variables) == 0.0
+    return alike
 
 
 @helper
@@ -193,15 +216,32 @@ def repeat_first_cell(states: States, tile: Tile):
 
 
 @helper
+def face_size(tiles: Tiles, tile: Tile, side, i):
+    """Area of face i of a row on a domain side, over that of a planar face."""
+    block, x = tiles.table[tile.number, BLOCK], tiles.table[tile.number, X0]
+    if side == 0:
+        return tiles.metrics[block, LOW, x] * tiles.metrics[block, VOLUME, x]
+    if side == 1:
+        last = x + tile.x - 1
+        return tiles.metrics[block, HIGH, last] * tiles.metrics[block, VOLUME, last]
+    return tiles.metrics[block, VOLUME, x + i]
+
+
+@helper
 def account_faces(tiles: Tiles, tile: Tile, side, F, flux, rows, n, times, amount):
     """Add the flux through n faces in a row on a domain side to what has left through it, so many `times`; all faces
     of a uniform tile have the flux of the first."""
     step = 0 if tile.uniform else 1
     for v in static_range(PHASES + DIMENSIONS + 1):
         first = flux + position_of(v, side // 2) * rows
-        total = load(F, first)
-        for i in range(1, n):
-            total = total + load(F, first + i * step)
+        if RADIAL:
+            total = load(F, first) * face_size(tiles, tile, side, 0)
+            for i in range(1, n):
+                total = total + load(F, first + i * step) * face_size(tiles, tile, side, i)
+        else:
+            total = load(F, first)
+            for i in range(1, n):
+                total = total + load(F, first + i * step)
         for _ in range(times):
             tiles.through[tile.number, side, v] += total * amount
 

@@ -190,7 +190,7 @@ def redistribute(begin, end, band, new, contents: Contents, fraction, merging: M
                 new[box * LANES + i, v] = load(S, v * LANES + i)
             if BISECTION_FALLBACK:
                 if load(S, VARIABLES * LANES + i) < 0.0:
-                    new[box * LANES + i, VARIABLES - 1] = relaxed_by_bisection(Q, i)
+                    new[box * LANES + i, PHASES + DIMENSIONS + 1] = relaxed_by_bisection(Q, i)
 
 
 @driver

@@ -62,6 +62,8 @@ def expand(new, n):
         gained = max(min(missing, volume * (LARGEST_LOSS * W[PHASES + DIMENSIONS] / bulk_modulus(W))), 0.0)
         for v in static_range(PHASES + DIMENSIONS + 1):
             new[n, v] = state[v] * (volume / (volume + gained))
+        for v in static_range(PHASES + DIMENSIONS + 2, VARIABLES):
+            new[n, v] = state[v] * (volume / (volume + gained))
         new[n, VARIABLES] = volume + gained
 
 

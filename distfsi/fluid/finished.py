@@ -1,0 +1,105 @@
+"""The end of a finished run in radial coordinates, for another one that goes on from it."""
+
+from __future__ import annotations
+
+from ast import literal_eval
+from pathlib import Path
+
+import numpy as np
+
+from distfsi.coordinates import Coordinates
+from distfsi.errors import InputError
+from distfsi.laws.registry import laws_of
+from distfsi.narrowing import present
+from distfsi.output.restart import Restart, newest_restart
+from distfsi.output.scene_text import describe
+from distfsi.scene.description import Scene
+
+PHASE = "fluid.phases."
+
+
+class FinishedRun:
+    """What the cells of a run hold at its end, with the phases of the scene that goes on from it.
+
+    path, time   of its last restart file [s]
+    coordinates  in which it was computed
+    edges        (shells + 1,) of the cells along r [m]
+    layers       (layers + 1,) edges along z [m], None in one dimension
+    names        of this scene's phases
+    phases       how many they are
+    fractions    1 with two phases, else 0
+    contents     (rows + 1, layers or 1, shells): masses, momentum along r (and z), energy, volume fraction of the first
+                 of two phases, and 1, per volume
+    """
+
+    def __init__(self, run: str, scene: Scene):
+        """Raises InputError when the run has no restart file, or what it computed does not fit the scene."""
+        path = newest_restart(Path(run)) if Path(run).is_dir() else Path(run)
+        if path is None:
+            raise InputError([f"fluid.map.run: {run} has no restart file: a run in radial coordinates ends with one"])
+        restart = Restart(path)
+        self.path, self.time = path, restart.time
+        fluid = present(scene.fluid)
+        self._there = restart.scene
+        self.coordinates = self._coordinates()
+        lower, upper, cells = (literal_eval(self._there[f"domain.{key}"]) for key in ("lower", "upper", "cells"))
+        edges = [a + (b - a) / n * np.arange(n + 1) for a, b, n in zip(lower, upper, cells, strict=True)]
+        self.edges, self.layers = edges[0], edges[1] if len(edges) > 1 else None
+        self.names = [phase.name for phase in fluid.phases]
+        self.phases, self.fractions = len(self.names), int(len(self.names) == 2)
+        self._check_phases(scene)
+        self.contents = self._arranged(restart.array("fluid/cells/state")[:, 0].astype(np.float64), scene)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the contents but for the last one."""
+        return len(self.contents) - 1
+
+    def _coordinates(self) -> Coordinates:
+        """Raises InputError unless they are radial."""
+        kinds = {kind.__name__: kind for kind in laws_of(Coordinates) if kind.radial}
+        if self._there["domain.coordinates"] not in kinds:
+            text = f"{self.path} is a run in planar coordinates; expected cylindrical, spherical or axisymmetric"
+            raise InputError([f"fluid.map.run: {text}"])
+        return kinds[self._there["domain.coordinates"]]()
+
+    @property
+    def _names_there(self) -> list[str]:
+        return [
+            key.removeprefix(PHASE) for key, value in self._there.items() if key.startswith(PHASE) and value == "Phase"
+        ]
+
+    def _check_phases(self, scene: Scene) -> None:
+        """Each phase of the run is one of the scene, with the same equation of state; both count in float64."""
+        here, faults = describe(scene), []
+        for name in self._names_there:
+            if name not in self.names:
+                faults.append(f"fluid.phases: has no '{name}', which {self.path} holds")
+                continue
+            keys = {key for known in (here, self._there) for key in known if key.startswith(f"{PHASE}{name}.eos")}
+            faults += [
+                f"{key}: {here.get(key, 'absent')}; was {self._there.get(key, 'absent')} in {self.path}"
+                for key in sorted(keys)
+                if here.get(key) != self._there.get(key)
+            ]
+        if any(known["fluid.precision"] != repr("float64") for known in (here, self._there)):
+            faults.append("fluid.precision: only float64 can be mapped, not yet float32")
+        if faults:
+            raise InputError(faults)
+
+    def _arranged(self, state: np.ndarray, scene: Scene) -> np.ndarray:
+        """`contents` from the run's conserved state (variables, layers or 1, shells)."""
+        there, fluid = self._names_there, present(scene.fluid)
+        P = len(there)
+        masses = {name: state[k] for k, name in enumerate(there)}
+        fraction = {there[0]: state[-1], there[-1]: 1.0 - state[-1]} if P == 2 else {there[0]: np.ones(state.shape[1:])}
+        if self.fractions and P == 1:
+            (other,) = set(self.names) - set(there)
+            trace = fluid.minimum_volume_fraction
+            density = next(r.state.density for r in fluid.regions if self.names[r.state.phase] == other)
+            masses[other] = np.full(state.shape[1:], trace * density)
+            fraction = {there[0]: fraction[there[0]] - trace, other: np.full(state.shape[1:], trace)}
+        motion_and_energy = state[P : P + len(self.coordinates.axes) + 1]
+        rows = [*(masses[name] for name in self.names), *motion_and_energy]
+        rows += [fraction[self.names[0]]] if self.fractions else []
+        return np.stack([*rows, np.ones(state.shape[1:])])

@@ -1,0 +1,208 @@
+"""A run goes on from the end of another of fewer dimensions: everything arrives, and the wave goes on."""
+
+import numpy as np
+import pytest
+
+from distfsi.diagnostics.budget import Budget
+from distfsi.errors import InputError
+from distfsi.fluid.mapping import shell_parts
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.fields import read_cells, series
+from distfsi.run import run
+from distfsi.scene import load, overlaps
+from distfsi.simulation import Simulation
+from tubes import advance, fields, radii
+
+PHASES = """
+[fluid.phases]
+gas = { eos = "ideal_gas", gamma = 1.4 }
+charge = { eos = "jwl", rho0 = 1630, A = 3.712e11, B = 3.21e9, R1 = 4.15, R2 = 0.95, omega = 0.3 }
+[[fluid.regions]]
+phase = "gas"
+density = 1.2
+pressure = 1e5
+"""
+CHARGE = """[[fluid.regions]]
+phase = "charge"
+density = 1630
+pressure = 8e9
+shape = { kind = "ball", center = CENTER, radius = 0.05 }
+"""
+LINE = (
+    """
+[domain]
+symmetry = "SYMMETRY"
+lower = 0
+upper = 0.5
+cells = 100
+x = ["axis", "outflow"]
+[time]
+end = 2.5e-5
+"""
+    + PHASES
+    + CHARGE.replace("CENTER", "0")
+)
+AXIS = (
+    """
+[domain]
+symmetry = "axisymmetric"
+lower = [0, -0.4]
+upper = [0.4, 0.4]
+cells = [20, 40]
+x = ["axis", "outflow"]
+[time]
+end = 2.5e-5
+"""
+    + PHASES
+    + CHARGE.replace("CENTER", "[0, 0.02]")
+    + "velocity = [0, 300]\n"
+)
+# dimensions and what else the target's domain says, by the run that it goes on from
+TARGETS = {
+    ("spherical", "axisymmetric"): ("[0, 0]", "[0.5, 0.5]", "[20, 20]", '["axis", "outflow"]'),
+    ("spherical", "planar"): ("[0, 0, 0]", "[0.5, 0.5, 0.5]", "[14, 14, 14]", '["symmetry", "outflow"]'),
+    ("spherical", "spherical"): ("0", "0.7", "31", '["axis", "outflow"]'),
+    ("cylindrical", "planar"): ("[-0.51, -0.5]", "[0.6, 0.52]", "[22, 21]", '["outflow", "outflow"]'),
+    ("axisymmetric", "planar"): ("[0, 0, -0.45]", "[0.5, 0.5, 0.45]", "[10, 10, 18]", '["symmetry", "outflow"]'),
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Output directories of short runs, by their symmetry."""
+    directories = {}
+    for symmetry in ("spherical", "cylindrical", "axisymmetric"):
+        folder = tmp_path_factory.mktemp(symmetry)
+        text = AXIS if symmetry == "axisymmetric" else LINE.replace("SYMMETRY", symmetry)
+        (folder / "scene.toml").write_text(text)
+        scene = load(folder / "scene.toml", [f"output.directory={folder / 'out'}"])
+        run(scene, Communicator(), 1)
+        directories[symmetry] = folder / "out"
+    return directories
+
+
+def target(folder, directory, symmetry, box, more=""):
+    """The scene that goes on from the run in a directory."""
+    lower, upper, cells, x = box
+    domain = f'[domain]\nsymmetry = "{symmetry}"\nlower = {lower}\nupper = {upper}\ncells = {cells}\nx = {x}\n'
+    path = folder / "target.toml"
+    path.write_text(domain + "[time]\nend = 4e-5\n" + PHASES + f'[fluid.map]\nrun = "{directory}"\n' + more)
+    return load(path)
+
+
+def last_pressure(directory):
+    """The highest pressure [Pa] at the end of a run."""
+    _, cells, *_ = read_cells(series(directory, "cells")[-1][1])
+    return cells["pressure"].max()
+
+
+# ---- exact volumes ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("volume", "lower", "whole"),
+    [
+        (overlaps.ball_to_corner, (-1.3, -1.2, -1.1), 4.0 / 3.0 * np.pi),
+        (overlaps.ball_to_ring, (0.0, -1.2), 4.0 / 3.0 * np.pi),
+        (overlaps.disc_to_corner, (-1.3, -1.1), np.pi),
+        (overlaps.ball_to_shell, (0.0,), 4.0 / 3.0 * np.pi),
+        (overlaps.disc_to_circle, (0.0,), np.pi),
+    ],
+)
+def test_shells_lie_in_cells_without_a_gap(volume, lower, whole):
+    """All parts add up to the shells, and to the cells that are full; each against many points."""
+    edges = [np.linspace(a, 1.25, 12) for a in lower]
+    grids = [np.meshgrid(*(e[s] for e in edges), indexing="ij") for s in (np.s_[:-1], np.s_[1:])]
+    low, high = (np.stack([g.ravel() for g in grid], axis=1) for grid in grids)
+    radii_of_shells = np.array([0.0, 0.21, 0.5, 0.77, 1.0])
+    parts = shell_parts(volume, low, high, radii_of_shells).toarray()
+    power = 3 if whole > np.pi else 2
+    np.testing.assert_allclose(parts.sum(axis=0), whole * np.diff(radii_of_shells**power), rtol=1e-13)
+    assert parts.min() > -1e-14
+    # by many points, weighted with what the coordinates make of a volume
+    share = (np.arange(24) + 0.5) / 24
+    points = np.stack([g.ravel() for g in np.meshgrid(*[share] * len(lower), indexing="ij")], axis=1)
+    for cell in np.linspace(0, len(low) - 1, 9).astype(int):
+        place = low[cell] + (high[cell] - low[cell]) * points
+        weight = {"ball_to_ring": 2.0 * np.pi * place[:, 0], "disc_to_circle": 2.0 * np.pi * place[:, 0]}
+        weight["ball_to_shell"] = 4.0 * np.pi * place[:, 0] ** 2
+        each = weight.get(volume.__name__, np.ones(len(place))) * np.prod(high[cell] - low[cell]) / len(place)
+        inside = (place**2).sum(axis=1) < 0.77**2
+        assert parts[cell, :3].sum() == pytest.approx(each[inside].sum(), abs=0.05 * each.sum())
+
+
+# ---- totals ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("source", "symmetry"), TARGETS)
+def test_everything_arrives(finished, tmp_path, source, symmetry):
+    """Masses, radial momentum (and that along the axis) and energy to 1e-12, and no pressure above the source's."""
+    scene = target(tmp_path, finished[source], symmetry, TARGETS[source, symmetry])
+    simulation = Simulation.of(scene, Communicator(), 1)
+    mapping = simulation.fluid.mapping
+    print("\n".join(mapping.lines()))
+    np.testing.assert_allclose(mapping.after, mapping.before, rtol=1e-12)
+    assert np.all(mapping.before != 0.0)
+    assert simulation.time == pytest.approx(2.5e-5) and len(mapping.lines()) == 1 + len(mapping.before)
+    highest = last_pressure(finished[source])
+    assert fields(simulation)["pressure"].max() <= 1.001 * highest
+    budget = Budget(simulation.fluid, None, None)
+    budget.row(simulation)
+    for _ in range(5):
+        simulation.step()
+    row = budget.row(simulation)
+    assert max(abs(value) for key, value in row.items() if key.startswith("drift")) < 1e-12
+    assert fields(simulation)["pressure"].max() <= 1.001 * highest
+
+
+def test_the_share_in_the_domain_is_told(finished, tmp_path):
+    """An eighth of the sphere's masses and energy lies in an octant."""
+    eighth = target(tmp_path, finished["spherical"], "planar", TARGETS["spherical", "planar"])
+    whole = target(tmp_path, finished["spherical"], "spherical", TARGETS["spherical", "spherical"])
+    part, all_of_it = (Simulation.of(scene, Communicator(), 1).fluid.mapping.before for scene in (eighth, whole))
+    np.testing.assert_allclose(8.0 * part, all_of_it, rtol=1e-12)
+
+
+def test_the_wave_goes_on(finished, tmp_path):
+    """(r, z) from the sphere, beside the sphere that went on in its own coordinates."""
+    line, plane = (
+        advance(
+            Simulation.of(
+                target(tmp_path, finished["spherical"], symmetry, TARGETS["spherical", symmetry]), Communicator(), 1
+            )
+        )
+        for symmetry in ("spherical", "axisymmetric")
+    )
+    p, r = fields(line)["pressure"].ravel(), radii(line)[0].ravel()
+    found, distance = fields(plane)["pressure"], radii(plane)[0]
+    error = np.abs(found - np.interp(distance, r, p)) / p.max()
+    assert error[distance < 0.48].mean() < 0.02
+
+
+def test_other_regions_stay(finished, tmp_path):
+    """A pool of heavy gas under the map is painted over it."""
+    pool = '[[fluid.regions]]\nphase = "gas"\ndensity = 50\npressure = 1e5\n'
+    pool += 'shape = { kind = "box", lower = [0, 0], upper = [0.5, 0.05] }\n'
+    box = TARGETS["spherical", "axisymmetric"]
+    simulation = Simulation.of(target(tmp_path, finished["spherical"], "axisymmetric", box, pool), Communicator(), 1)
+    found = fields(simulation)
+    np.testing.assert_allclose(found["density"][0, :2], 50.0, rtol=1e-2)  # but for a trace of the charge
+    np.testing.assert_allclose(found["pressure"][0, :2], 1e5, rtol=1e-9)
+    assert found["pressure"][0, 2:].max() > 1e6
+
+
+def test_what_does_not_fit_is_refused(finished, tmp_path):
+    """In words, with the key."""
+    box = TARGETS["spherical", "planar"]
+    with pytest.raises(InputError, match=r"fluid.map.run.*no restart file"):
+        target(tmp_path, tmp_path / "nowhere", "planar", box)
+    flat = target(tmp_path, finished["spherical"], "planar", ("[0, 0]", "[1, 1]", "[8, 8]", '["symmetry", "outflow"]'))
+    with pytest.raises(InputError, match=r"fluid.map.run: spherical in .* does not fit into 2D, planar"):
+        Simulation.of(flat, Communicator(), 1)
+    target(tmp_path, finished["spherical"], "planar", box)
+    other = load(tmp_path / "target.toml", ["fluid.phases.gas.gamma=1.3"])
+    with pytest.raises(InputError, match=r"fluid.phases.gas.eos.gamma: 1.3; was 1.4"):
+        Simulation.of(other, Communicator(), 1)
+    single = load(tmp_path / "target.toml", ["fluid.precision=float32"])
+    with pytest.raises(InputError, match=r"fluid.precision: only float64 can be mapped"):
+        Simulation.of(single, Communicator(), 1)
