@@ -143,8 +143,8 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction, given.tied)
-    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
+    rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction)
+    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
 
 
 def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:
