@@ -260,7 +260,7 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies.
+    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -273,10 +273,20 @@ class Solid:
     artificial_stress: float = 0.0
     obstacles: bool = False
     friction: float = 0.0
+    tied: tuple[tuple[str, ...], ...] = ()
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
         return body.form or self.form
+
+    @property
+    def first_tied(self) -> tuple[int, ...]:
+        """For each body the number of the first one among those that it holds together with, through any of them."""
+        first, numbers = list(range(len(self.bodies))), {body.name: n for n, body in enumerate(self.bodies)}
+        for names in self.tied:
+            joined = {first[numbers[name]] for name in names}
+            first = [min(joined) if n in joined else n for n in first]
+        return tuple(first)
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------

@@ -246,6 +246,9 @@ class SolidInput(Table):
 
     bodies: dict[str, BodyInput] = Field({}, description="`[solid.bodies.NAME]`: the bodies")
     obstacles: dict[str, ObstacleInput] = Field({}, description="`[solid.obstacles.NAME]`: rigid parts")
+    tied: tuple[tuple[str, ...], ...] = Field(
+        (), description="lists of names of bodies that hold together where they touch, by bonds or as one material"
+    )
     form: description.SolidForm = Field(
         "total_lagrangian",
         description="particles hold on to the neighbours they start with, by bonds that damage cuts, or act on those "
