@@ -8,7 +8,7 @@ import numpy as np
 from distfsi.coupling.protocol import Coupling
 from distfsi.diagnostics.watched import Watched
 from distfsi.fluid.fluid import Fluid
-from distfsi.gauges import extents_of, per_extent
+from distfsi.gauges import per_extent
 from distfsi.mesh.blocks import Snapshot
 from distfsi.narrowing import present
 from distfsi.solid.solid import Solid
@@ -28,7 +28,8 @@ class Budget:
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
         self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
-        spanned = extents_of(self.dimensions, (fluid.blocks if fluid else present(solid).blocks).grid.coordinates)
+        grid = (fluid.blocks if fluid else present(solid).blocks).grid
+        spanned = grid.dimensions + grid.coordinates.turns
         self._kg, impulse, self._joule = (per_extent(unit, spanned) for unit in ("kg", "N s", "J"))
         self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
         masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]

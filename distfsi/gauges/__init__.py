@@ -13,9 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from distfsi.coordinates import Coordinates
 from distfsi.laws.law import Law, quantity
-from distfsi.laws.registry import word_of
 
 AXES = "xyz"
 Kept = Mapping[str, np.ndarray]
@@ -29,12 +27,6 @@ def each_step() -> Any:
 def each_hundredth() -> Any:
     """The field `every` of a gauge that by default takes a hundred samples."""
     return quantity("s", "time between samples; default a hundredth of the run", default=None, above=0.0)
-
-
-def extents_of(dimensions: int, coordinates: Coordinates) -> int:
-    """How many extents totals count: those of the domain, and those that radial coordinates turn it through."""
-    turned = {"axisymmetric": 1, "cylindrical": 1, "spherical": 2}
-    return dimensions + turned.get(word_of(type(coordinates)), 0)
 
 
 def per_extent(unit: str, extents: int) -> str:
