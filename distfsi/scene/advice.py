@@ -10,6 +10,7 @@ import numpy as np
 from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
+from distfsi.scene.warnings import warnings
 
 AXES, ENDS = "xyz", ("low", "high")
 BEST_SPACING = 0.5  # of a fluid cell
@@ -26,6 +27,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     if layout:
         yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
+    yield from warnings(scene)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
@@ -58,7 +60,7 @@ def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
 def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
-    if scene.sources:
+    if scene.sources or (scene.fluid and scene.fluid.detonation):
         return
     if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"

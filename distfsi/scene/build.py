@@ -92,6 +92,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         _detonation(given.detonation, phases) if given.detonation else None,
         Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
         _map(given.map, dimensions) if given.map else None,
+        given.hydrostatic_level,
     )
 
 
@@ -104,7 +105,7 @@ def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation
     index, burn = _index(phases, given.phase), given.burn.build()
     found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
     burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
-    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators), given.path)
 
 
 def _map(given: MapInput, dimensions: int) -> Map:

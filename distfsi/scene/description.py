@@ -27,6 +27,7 @@ TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
+DetonationPath = Literal["straight", "around"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
@@ -171,11 +172,13 @@ Detonator = PointDetonator | LineDetonator | PlaneDetonator
 
 @dataclass(frozen=True)
 class Detonation:
-    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+    """How the explosive, a phase, burns, all numbers of its law known; what lights it, and whether fronts run straight
+    or around what is no explosive at the start."""
 
     phase: int
     burn: Burn
     detonators: tuple[Detonator, ...]
+    path: DetonationPath = "straight"
 
 
 @dataclass(frozen=True)
@@ -198,7 +201,11 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`."""
+    """The compressible flow. One phase: Euler; two: `model`.
+
+    hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
+    regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
+    """
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
@@ -212,6 +219,7 @@ class Fluid:
     detonation: Detonation | None = None
     afterburn: Afterburn | None = None
     map: Map | None = None
+    hydrostatic_level: float | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -371,7 +379,7 @@ class Performance:
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
 
     title: str
     domain: Domain
@@ -384,3 +392,4 @@ class Scene:
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    stages: tuple[Scene, ...] = ()
