@@ -1,5 +1,6 @@
 """Charges by name, mass and place: exactly their mass whatever the cells, in any block, down to parts of a cell."""
 
+import csv
 from math import pi
 
 import pytest
@@ -9,6 +10,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
 from distfsi.scene.description import Ball, Box, Cylinder, PointDetonator
 from distfsi.simulation import Simulation
+from launch import run_ranks
 
 AIR = """
 [domain]
@@ -138,6 +140,82 @@ def test_wrong_charges(scene, text, fault):
     with pytest.raises(InputError) as caught:
         scene(AIR + text)
     assert any(fault in line for line in caught.value.faults), caught.value.faults
+
+
+ROUND = """
+[domain]
+symmetry = "spherical"
+lower = 0
+upper = "0.5 m"
+cells = 40
+x = ["axis", "outflow"]
+[time]
+end = "60 us"
+[fluid.phases.air]
+material = "air"
+[[fluid.regions]]
+phase = "air"
+[[charges]]
+material = "TNT"
+mass = "0.2 kg"
+center = 0
+"""
+
+
+def in_rings(text):
+    """The same scene in axisymmetric coordinates."""
+    text = text.replace("spherical", "axisymmetric").replace("lower = 0", "lower = [0, -0.2]")
+    text = text.replace('upper = "0.5 m"\ncells = 40', "upper = [0.3, 0.2]\ncells = [24, 32]")
+    return text.replace("center = 0", "center = [0, 0]")
+
+
+def test_a_charge_in_radial_coordinates(scene):
+    """The same mass in shells and in rings, burnt with all its energy."""
+    rings = in_rings(ROUND)
+    for text in (ROUND, rings, rings + 'shape = "cylinder"\nlength_over_diameter = 2'):
+        simulation = Simulation.of(scene(text), Communicator(), 1)
+        fluid = simulation.fluid
+        before, held = fluid.totals()[0], fluid.held_energies()[0]
+        assert held / fluid.model.constants["HELD_ENERGY"][0] == pytest.approx(0.2, rel=2e-6)
+        while not simulation.done:
+            simulation.step()
+        after = fluid.totals()[0] + fluid.left_domain()
+        assert after[[0, 1, -1]] == pytest.approx(before[[0, 1, -1]], rel=1e-12)
+        assert fluid.held_energies()[0] < 1e-9 * held
+
+
+EXPLOSIVE = """
+[fluid.phases.tnt]
+material = "TNT"
+[fluid.detonation]
+phase = "tnt"
+[[fluid.detonation.detonators]]
+kind = "point"
+position = [0, 0]
+"""
+AFTERBURN = """
+[fluid.afterburn]
+phase = "tnt"
+law = { kind = "miller", energy = 1e7, rate = 1e4 }
+"""
+
+
+def test_a_burning_charge_is_mapped_with_its_shares(scene, tmp_path):
+    """From shells to rings while it burns: nothing is lost of what the shares hold back."""
+    (tmp_path / "shells.toml").write_text(ROUND + AFTERBURN)
+    words = [tmp_path / "shells.toml", "--set", f'output.directory="{tmp_path}/shells"', "--set", "time.end=3e-6"]
+    run_ranks(1, ["-m", "distfsi", *words], 120.0)
+    with open(tmp_path / "shells" / "history.csv") as file:
+        *_, last = csv.DictReader(file)
+    rings = in_rings(ROUND) + f'[fluid.map]\nrun = "{tmp_path}/shells"\n'
+    with pytest.raises(InputError, match="holds its charge already"):
+        scene(rings)
+    rings = rings[: rings.index("[[charges]]")] + rings[rings.index("[fluid.map]") :] + EXPLOSIVE
+    mapped = Simulation.of(scene(rings + AFTERBURN), Communicator(), 1).fluid.held_energies()
+    held = [float(last[f"held by {share} [J]"]) for share in ("unburnt", "afterburn")]
+    assert mapped == pytest.approx(held, rel=1e-9) and 1e5 < held[0] < 3.2e6  # it is on fire
+    with pytest.raises(InputError, match="fluid.afterburn.law: absent; was"):
+        Simulation.of(scene(rings), Communicator(), 1)
 
 
 def test_a_mass_needs_three_dimensions(scene):

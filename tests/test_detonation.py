@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from distfsi.errors import InputError
+from distfsi.fluid.marching import march
 from distfsi.laws.afterburn.miller import Miller
 from distfsi.laws.burn.programmed import Programmed
 from distfsi.mesh.communicator import Communicator
@@ -277,3 +278,78 @@ def test_speed_and_pressure_follow_from_the_equation_of_state(scene):
         plain, 'fluid.detonation.burn={kind="programmed", density=1630, energy=4.2945e6}'
     ).fluid.detonation.burn
     assert burn.speed == pytest.approx(6929.3, rel=1e-4) and burn.pressure == pytest.approx(21.0e9, rel=1e-3)
+
+
+# ---- around obstacles ------------------------------------------------------------------------------------------------
+
+CORNER = """
+[domain]
+lower = [0, 0]
+upper = ["0.1 m", "0.1 m"]
+cells = [50, 50]
+[time]
+end = "14 us"
+maximum_steps = 60
+[performance]
+block_cells = [16, 16]
+[fluid.phases.air]
+material = "air"
+[fluid.phases.charge]
+material = "TNT"
+[[fluid.regions]]
+phase = "air"
+[[fluid.regions]]
+phase = "charge"
+shape = { kind = "box", lower = ["5 mm", "10 mm"], upper = ["95 mm", "90 mm"] }
+[[fluid.regions]]
+phase = "air"
+shape = { kind = "box", lower = ["30 mm", "40 mm"], upper = ["50 mm", "60 mm"] }
+[fluid.detonation]
+phase = "charge"
+path = "around"
+[[fluid.detonation.detonators]]
+kind = "point"
+position = ["10 mm", "50 mm"]
+"""
+
+
+def test_fronts_march_in_circles():
+    n = 61
+    x = (np.arange(n) + 0.5) / n
+    r = np.hypot(*np.meshgrid(x - 0.5, x - 0.5))
+    times = march(np.where(r < 6.0 / n, r / 2.0, np.inf), np.ones((n, n), dtype=bool), (1.0 / n, 1.0 / n), 2.0)
+    assert np.abs(times - r / 2.0).max() < 0.003 * times.max()
+    for other in (times.T, times[::-1], times[:, ::-1]):
+        assert np.abs(times - other).max() < 1e-14
+    closed = np.ones((n, n), dtype=bool)
+    closed[:, 10] = False
+    assert np.isinf(march(np.where(r < 0.1, r, np.inf), closed, (1.0, 1.0), 1.0)[:, :10]).all()
+
+
+def test_a_detonation_goes_round_a_corner(scene):
+    """Lit behind the block of air only by way of its corners, alike on both sides."""
+    simulation = start(scene(CORNER))
+    blocks, speed = simulation.blocks, simulation.scene.fluid.detonation.burn.speed
+    times = np.empty((50, 50))
+    for b in range(blocks.local_count):
+        place = [slice(o, o + n) for o, n in zip(blocks.origin[b][::-1], blocks.extent[b][::-1], strict=True)]
+        times[tuple(place[1:])] = blocks.without_ghosts(simulation.fluid.reactions.lighting.host())[
+            b, 0, 0, : blocks.extent[b][1], : blocks.extent[b][0]
+        ]
+    x = (np.arange(50) + 0.5) * 2e-3
+    X, Y = np.meshgrid(x, x)
+    up = np.abs(Y - 0.05)
+    # the way round: to a corner in front of the block, along it, and on from the one behind
+    direct = np.hypot(X - 0.01, up)
+    first, second = np.hypot(0.02, 0.01), 0.02
+    shade = (X > 0.05) & (up < 0.01)
+    behind = first + second + np.hypot(X - 0.05, up - 0.01)
+    inside = (X > 0.005) & (X < 0.095) & (up < 0.04)
+    error = np.abs(times * speed - behind)[shade & inside]
+    assert error.max() < 2.6e-3 and error.mean() < 1.3e-3  # half a cell a corner: by centers of cells
+    seen = inside & (up * 0.02 >= 0.01 * (X - 0.01) + 1e-4)  # beside the ray through the first corner
+    assert np.abs(times * speed - direct)[seen].max() < 1.5e-3
+    assert np.abs(times - times[::-1]).max() < 1e-18
+    whole = run_of(simulation)
+    energy = whole[4]
+    assert np.abs(energy - energy[:, ::-1]).max() < 1e-9 * energy.max()

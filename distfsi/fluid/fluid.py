@@ -76,7 +76,7 @@ class Fluid:
         self._signal: float | None = None
         self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
-        self.reactions = Reactions(given, model, blocks, device, real) if model.carried else None
+        self.reactions = Reactions(scene, model, blocks, device) if model.carried else None
 
     def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
         states = np.zeros((3, 2, self.model.variables))
@@ -313,7 +313,10 @@ class Fluid:
     def held_energies(self) -> np.ndarray:
         """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
         first = self.model.fraction + 1
-        shares = [self.cells(b)[first:].astype(np.float64).sum(axis=(1, 2, 3)) for b in range(self.blocks.local_count)]
+        shares = [
+            self.metrics.weighted(self.cells(b)[first:].astype(np.float64), b).sum(axis=(1, 2, 3))
+            for b in range(self.blocks.local_count)
+        ]
         sums = np.reshape(shares, (self.blocks.local_count, len(self.model.carried)))
         return self.blocks.sum(sums * self._cell_volume()) * self.model.constants["HELD_ENERGY"]
 

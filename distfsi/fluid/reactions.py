@@ -16,7 +16,7 @@ from distfsi.fluid.lighting import lighting_times
 from distfsi.fluid.model import FluidModel
 from distfsi.mesh.blocks import Blocks
 from distfsi.narrowing import present
-from distfsi.scene.description import Fluid
+from distfsi.scene.description import Scene
 
 
 class Reactions:
@@ -25,10 +25,11 @@ class Reactions:
     lighting  (local blocks, 1, Z, Y, X) when each cell is lit [s]
     """
 
-    def __init__(self, fluid: Fluid, model: FluidModel, blocks: Blocks, device: Device, real: str):
+    def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device):
         self.blocks, self.device = blocks, device
-        self.kernels = device.build([react], model.constants, model.bindings, real)
-        times = lighting_times(present(fluid.detonation), blocks) if fluid.detonation else blocks.allocate(1) - np.inf
+        fluid = present(scene.fluid)
+        self.kernels = device.build([react], model.constants, model.bindings, fluid.precision)
+        times = lighting_times(scene, blocks) if fluid.detonation else blocks.allocate(1) - np.inf
         self.lighting = DualArray(device, times)
         self._changed = DualArray(device, np.zeros(blocks.local_count, np.int64))
         self._grid = blocks.grid_on(device)

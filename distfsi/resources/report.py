@@ -82,8 +82,7 @@ def _body(body: Body, particles: int, scene: Scene) -> str:
 
 
 def _charge(charge: Charge, scene: Scene) -> str:
-    dimensions = scene.domain.dimensions
-    kg = per_extent("kg", dimensions)
+    kg = per_extent("kg", scene.domain.dimensions + scene.domain.coordinates.turns)
     text = f"{charge.name}: {charge.meant:.4g} {kg}, {charge.placed:.4g} {kg} as placed"
     text += f" (one of {charge.copies} parts)" if charge.copies > 1 else ""
     text += f", {charge.cells:.3g} cells per radius; the energy of {charge.tnt:.4g} {kg} of TNT"
@@ -96,8 +95,9 @@ def _touches(charge: Charge, body: Body, scene: Scene) -> bool:
 
 
 def _distances(charge: Charge, scene: Scene) -> Iterator[str]:
+    extents = scene.domain.dimensions + scene.domain.coordinates.turns
     for name, length in distances(scene, charge):
-        scaled = f", Z = {charge.scaled(length):.3g} m/kg^(1/3)" if scene.domain.dimensions == 3 else ""
+        scaled = f", Z = {charge.scaled(length):.3g} m/kg^(1/3)" if extents == 3 else ""
         yield f"{name}: {length:.4g} m from the center of charge '{charge.name}'{scaled}"
 
 

@@ -60,7 +60,7 @@ def _absent_phases(fluid: Fluid, layout: Layout) -> Iterator[str]:
 def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
-    if scene.sources:
+    if scene.sources or (scene.fluid and scene.fluid.detonation):
         return
     if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"

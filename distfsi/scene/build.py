@@ -105,7 +105,7 @@ def _detonation(given: DetonationInput, phases: tuple[Phase, ...]) -> Detonation
     index, burn = _index(phases, given.phase), given.burn.build()
     found = chapman_jouguet(phases[index].eos, burn.density, burn.energy)
     burn = replace(burn, speed=burn.speed or found.front, pressure=burn.pressure or found.pressure)
-    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators))
+    return Detonation(index, burn, tuple(detonator.build() for detonator in given.detonators), given.path)
 
 
 def _map(given: MapInput, dimensions: int) -> Map:
@@ -145,7 +145,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
     rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction)
-    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
+    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
 
 
 def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:

@@ -11,17 +11,22 @@ from typing import Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from distfsi.scene.faults import Fault, Path
+from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.materials import Material, find, materials, unknown
 from distfsi.scene.units import to_si
 from distfsi.scene.values import Delay, Direction, Mass, Position, PositiveNumber, Table
 
 BURNS_AT_ONCE = "instant"
+SHAPES = {  # of charges, by dimensions and symmetry of the domain
+    (3, "planar"): ("sphere", "hemisphere", "cylinder", "box"),
+    (2, "axisymmetric"): ("sphere", "hemisphere", "cylinder"),
+    (1, "spherical"): ("sphere",),
+}
 
 
 class ChargeInput(Table):
-    """A charge of an explosive, in three dimensions. Its phase is that of the material, if the fluid has it, else a new
-    one of that name."""
+    """A charge of an explosive, in three dimensions or in spherical or axisymmetric coordinates. Its phase is that of
+    the material, if the fluid has it, else a new one of that name."""
 
     material: str = Field(description="name of an explosive (`distfsi materials`)")
     mass: Mass = Field(description="its mass; of a hemisphere that of the half that is there")
@@ -54,21 +59,30 @@ def add_charges(data: dict[str, Any]) -> tuple[list[Fault], list[Fault]]:
     if not isinstance(charges, list) or not isinstance(fluid, dict):
         return [], []
     domain = data.get("domain")
-    cells = domain.get("cells") if isinstance(domain, dict) else None
+    domain = domain if isinstance(domain, dict) else {}
+    cells = domain.get("cells")
     dimensions = len(cells) if isinstance(cells, list) else 1
-    if dimensions != 3:
-        return [Fault(("charges",), "a mass needs three dimensions; in fewer give a region")], []
+    shapes = SHAPES.get((dimensions, domain.get("symmetry", "planar")))
+    if shapes is None:
+        text = "a mass needs three dimensions, or spherical or axisymmetric coordinates; else give a region"
+        return [Fault(("charges",), text)], []
+    if "map" in fluid:
+        text = "the run that is mapped holds its charge already; leave it out, or give another one as a region"
+        return [Fault(("charges",), text)], []
     faults, notes = [], []
     for n, table in enumerate(charges):
         path: Path = ("charges", n)
         try:
-            charge = TypeAdapter(ChargeInput).validate_python(table, context={"dimensions": 3})
+            charge = TypeAdapter(ChargeInput).validate_python(table, context={"dimensions": dimensions})
         except ValidationError:
             continue
         material = find(charge.material)
         if material is None or material.detonation is None:
             explosives = [each for each in materials() if each.detonation]
             faults.append(Fault((*path, "material"), f'"{charge.material}" {unknown(charge.material, explosives)}'))
+            continue
+        if charge.shape not in shapes:
+            faults.append(Fault((*path, "shape"), f'"{charge.shape}"' + one_of(shapes, charge.shape) + " here"))
             continue
         notes.append(Fault(path, _add_charge(charge, material, fluid)))
     return faults, notes
@@ -112,6 +126,10 @@ def _shape(charge: ChargeInput, volume: float) -> tuple[dict[str, Any], str]:
             radius = (volume / (2.0 * pi * charge.length_over_diameter)) ** (1.0 / 3.0)
             length = 2.0 * radius * charge.length_over_diameter
             norm = sum(a * a for a in charge.axis) ** 0.5
+            if len(center) == 2:
+                low, high = ([r, center[1] + s * 0.5 * length] for s, r in ((-1.0, 0.0), (1.0, radius)))
+                table: dict[str, Any] = {"kind": "box", "lower": low, "upper": high}
+                return table, f"of radius {1e3 * radius:.4g} mm and length {1e3 * length:.4g} mm"
             half = [0.5 * length * a / norm for a in charge.axis]
             start, end = ([c + s * h for c, h in zip(center, half, strict=True)] for s in (-1.0, 1.0))
             table = {"kind": "cylinder", "start": start, "end": end, "radius": radius}

@@ -79,7 +79,8 @@ def check(
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
         yield from check_obstacles(sections, solid, domain, "fluid" in present)
-        yield from check_solid(solid, domain)
+        ties = list(check_ties(solid))
+        yield from ties or check_solid(solid, domain)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
@@ -196,6 +197,19 @@ def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: 
         if body.motion and any(body.motion.angles) and bool(body.motion.axis) != (domain.dimensions == 3):
             text = "an axis is needed to turn in 3D" if domain.dimensions == 3 else "only in 3D there is an axis"
             yield Fault((*path, body.name, "motion"), text)
+
+
+def check_ties(solid: Solid) -> Iterator[Fault]:
+    """Ties name bodies that are there, of one form."""
+    bodies = {body.name: body for body in solid.bodies}
+    for n, names in enumerate(solid.tied):
+        path = ("solid", "tied", n)
+        if unknown := [name for name in names if name not in bodies]:
+            yield Fault(path, f"'{unknown[0]}' is no body" + one_of(bodies, unknown[0]))
+        elif len(set(names)) < 2:
+            yield Fault(path, "expected two bodies or more")
+        elif len({solid.form_of(bodies[name]) for name in names}) > 1:
+            yield Fault(path, "tied bodies need one form")
 
 
 def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:

@@ -27,6 +27,7 @@ TwoPhaseModel = Literal["six_equation", "five_equation"]
 Scheme = Literal["rk2", "rk3"]
 Packing = Literal["lattice", "rings", "relaxed"]
 ObjectiveRate = Literal["jaumann", "green_naghdi"]
+DetonationPath = Literal["straight", "around"]
 CouplingScheme = Literal["cut_cells", "staircase", "immersed_boundary"]
 BoundaryKind = Literal["wall", "symmetry", "outflow", "inflow", "periodic", "axis"]
 
@@ -171,11 +172,13 @@ Detonator = PointDetonator | LineDetonator | PlaneDetonator
 
 @dataclass(frozen=True)
 class Detonation:
-    """How the explosive, a phase, burns, all numbers of its law known; and what lights it."""
+    """How the explosive, a phase, burns, all numbers of its law known; what lights it, and whether fronts run straight
+    or around what is no explosive at the start."""
 
     phase: int
     burn: Burn
     detonators: tuple[Detonator, ...]
+    path: DetonationPath = "straight"
 
 
 @dataclass(frozen=True)
@@ -257,7 +260,7 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies.
+    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -270,10 +273,20 @@ class Solid:
     artificial_stress: float = 0.0
     obstacles: bool = False
     friction: float = 0.0
+    tied: tuple[tuple[str, ...], ...] = ()
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
         return body.form or self.form
+
+    @property
+    def first_tied(self) -> tuple[int, ...]:
+        """For each body the number of the first one among those that it holds together with, through any of them."""
+        first, numbers = list(range(len(self.bodies))), {body.name: n for n, body in enumerate(self.bodies)}
+        for names in self.tied:
+            joined = {first[numbers[name]] for name in names}
+            first = [min(joined) if n in joined else n for n in first]
+        return tuple(first)
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------
@@ -366,7 +379,7 @@ class Performance:
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
 
     title: str
     domain: Domain
@@ -379,3 +392,4 @@ class Scene:
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    stages: tuple[Scene, ...] = ()

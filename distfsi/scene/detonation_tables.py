@@ -69,6 +69,9 @@ class DetonationInput(Table):
     detonators: tuple[DetonatorInput, ...] = Field(
         min_length=1, description="`[[fluid.detonation.detonators]]`: what lights it; the first front counts"
     )
+    path: description.DetonationPath = Field(
+        "straight", description='of the fronts; "around": solids and all that is no explosive at the start'
+    )
 
 
 class AfterburnSectionInput(Table):

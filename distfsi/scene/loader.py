@@ -14,12 +14,14 @@ from pydantic import ValidationError
 from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
+from distfsi.scene.coordinate_checks import check_map_is_there
 from distfsi.scene.description import Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
 from distfsi.scene.overrides import TABLES, apply
 from distfsi.scene.schema import Input, Sections, context_of
+from distfsi.scene.stages import path_in_stage, stage_inputs
 
 LARGEST_FILE = 64_000_000  # bytes of an input
 FAULT_LIMIT = 100  # that are told at once
@@ -36,14 +38,31 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
+    inputs = stage_inputs(data, file.stem)
     unnamed, incomplete = materials.fill(data)
-    sections, invalid = validate(data, str(file.parent))
-    scene, crossed = _assemble(sections, data, file.stem)
-    faults += uncharged + unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
+    scene, found = _checked(data, file)
+    stages: list[Scene] = []
+    for number, given in enumerate(inputs):
+        _, unknown = materials.fill(given)  # whose faults are those of the scene
+        stage, more = _checked(given, file)
+        more = [fault for fault in more if not _inside(fault.path, unknown)]
+        found += [Fault(path_in_stage(number, fault.path), fault.text) for fault in more]
+        stages += [stage] if stage else []
+    if scene is not None and not inputs:  # they will have run
+        found += check_map_is_there(scene)
+    faults += uncharged + unnamed + [fault for fault in found if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:
         raise InputError(locations.tell(faults))
-    return replace(scene, notes=tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)])))
+    noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
+    return replace(scene, notes=noted, stages=tuple(stages))
+
+
+def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
+    """The scene of `data`, without its stages, and all faults."""
+    sections, invalid = validate(data, str(file.parent))
+    scene, crossed = _assemble(sections, data, file.stem)
+    return scene, invalid + crossed
 
 
 @cache

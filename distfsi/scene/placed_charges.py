@@ -63,8 +63,8 @@ class Charge:
 
 
 def charges(scene: Scene) -> list[Charge]:
-    """Those that have a size, in the order of the regions; in radial coordinates none is known."""
-    fluid, domain = None if scene.domain.coordinates.radial else scene.fluid, scene.domain
+    """Those that have a size, in the order of the regions."""
+    fluid, domain = scene.fluid, scene.domain
     found = []
     for number, region in enumerate(fluid.regions if fluid else ()):
         phase = present(fluid).phases[region.state.phase]
@@ -93,23 +93,31 @@ def losses(cells: float) -> tuple[float, float]:
 
 def _volumes(scene: Scene, number: int, shape: Shape) -> tuple[float, float]:
     """Volume that the cells hold of a region's shape, and that of the shape inside the domain."""
-    domain, cell = scene.domain, math.prod(scene.domain.spacing)
-    exact = volume_within(shape, domain.lower, domain.upper)
+    domain, coordinates = scene.domain, scene.domain.coordinates
+    exact = None if coordinates.radial else volume_within(shape, domain.lower, domain.upper)
     centers = _cells_around(shape, domain)
+    cell = _cell_volumes(centers[0], domain)
     count = math.prod(map(len, centers))
     if count == 0:
         return 0.0, exact or 0.0
     if count > CELL_LIMIT and exact is not None:
         return exact, exact
-    sampled = cell_fractions(shape, centers, domain.spacing)
-    part = corrected(sampled, Filled.by(sampled), None if exact is None else exact / cell)
-    meant = cell * float(part.sum()) if exact is None else exact
+    part = cell_fractions(shape, centers, domain.spacing, coordinates)
+    if exact is not None:
+        part = corrected(part, Filled.by(part), exact / math.prod(domain.spacing))
+    meant = float((cell * part).sum()) if exact is None else exact
     later = present(scene.fluid).regions[number + 1 :]
-    hiding: list[Shape] = [shape for region in later if (shape := region.shape) is not None]
+    hiding: list[Shape] = [region.shape for region in later if region.shape is not None]
     hiding += [body.shape for body in scene.solid.bodies] if scene.solid else []
     for other in hiding:
-        part = part * (1.0 - cell_fractions(other, centers, domain.spacing))
-    return cell * float(part.sum()), meant
+        part = part * (1.0 - cell_fractions(other, centers, domain.spacing, coordinates))
+    return float((cell * part).sum()), meant
+
+
+def _cell_volumes(x: np.ndarray, domain: Domain) -> np.ndarray:
+    """Of the cells about centers x (n,) along the first axis (n,)."""
+    h, *others = domain.spacing
+    return domain.coordinates.volume(x - 0.5 * h, x + 0.5 * h) * math.prod(others)
 
 
 def _cells_around(shape: Shape, domain: Domain) -> tuple[np.ndarray, ...]:

@@ -28,7 +28,7 @@ def _charge(charge: Charge, bodies: tuple[Body, ...], domain: Domain) -> Iterato
         cost = f"{about} {100.0 * peak:.0f} % of the peak overpressure and puts the impulse {100.0 * impulse:.0f} % off"
         yield f"{charge.cells:.2g} cells per radius, which a few radii away costs {cost}; {ENOUGH} are better"
     if abs(charge.placed - charge.meant) > MISPLACED * charge.meant:
-        per = per_extent("kg", domain.dimensions)
+        per = per_extent("kg", domain.dimensions + domain.coordinates.turns)
         yield f"its cells hold {charge.placed:.4g} of the {charge.meant:.4g} {per} that are meant: the rest is hidden"
     for body in bodies:
         overlap = -gap_between(charge, body, domain)

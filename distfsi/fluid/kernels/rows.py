@@ -68,8 +68,11 @@ def primitives_row(U, P, u, su, p, sp, n):
 
 
 @helper
-def low_increment(v):
-    """Row of T with the increment of variable v from a cell's low face to its mean; that to its high face is row v."""
+def low_increment(v, axis):
+    """Row of T with the increment of variable v from a cell's low face to its mean; that to its high face is row v. In
+    radial coordinates they differ along r alone."""
+    if RADIAL:
+        return v + (VARIABLES if axis == 0 else 0)
     return v + VARIABLES if ASYMMETRIC else v
 
 
@@ -109,8 +112,8 @@ def increments_row(P, T, p, sp, step, t, st, n, fall):
             else:
                 low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
             store(T, t + v * st + i, high)
-            if ASYMMETRIC:
-                store(T, t + low_increment(v) * st + i, low)
+            if ASYMMETRIC and not RADIAL:
+                store(T, t + low_increment(v, 0) * st + i, low)
 
 
 @row
@@ -125,7 +128,7 @@ def increments_in_r_row(P, T, p, sp, t, st, n):
             along = reconstructed_in_r(cells, backward, forward, load(P, to_low + i))
             low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else along
             store(T, t + v * st + i, high)
-            store(T, t + low_increment(v) * st + i, low)
+            store(T, t + low_increment(v, 0) * st + i, low)
 
 
 # ---- the transverse pressure sensor ----------------------------------------------------------------------------------
@@ -186,7 +189,7 @@ def flux_row(P, T, F, faces: Faces, n):
             low[v] + load(T, faces.low + variable_at(v, faces.axis) * faces.rows + i) for v in static_range(VARIABLES)
         )
         right = tuple(
-            high[v] - load(T, faces.high + low_increment(variable_at(v, faces.axis)) * faces.rows + i)
+            high[v] - load(T, faces.high + low_increment(variable_at(v, faces.axis), faces.axis) * faces.rows + i)
             for v in static_range(VARIABLES)
         )
         # the flux
@@ -195,7 +198,7 @@ def flux_row(P, T, F, faces: Faces, n):
             store(F, faces.flux + v * faces.rows + i, flux[v])
         # the limiter's indicator
         c = min(sound_speed(left), sound_speed(right))
-        if ASYMMETRIC:  # then a cell's mean may have a much lower one
+        if ASYMMETRIC and not RADIAL:  # then a cell's mean may have a much lower one
             c = min(c, min(sound_speed(low), sound_speed(high)))
         indicator = limiter_indicator(low, high, flux, c, rate_of_face(P, i, faces))
         store(F, faces.flux + FLUXES * faces.rows + i, indicator)

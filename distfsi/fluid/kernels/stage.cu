@@ -161,7 +161,7 @@ DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int
     const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
     const auto f = tuple_of<FLUXES>(value);
     real c = minimum(sound_speed(numbers, L), sound_speed(numbers, R));
-    if constexpr (ASYMMETRIC) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
+    if constexpr (ASYMMETRIC && !RADIAL) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
     if (!(limiter_indicator(numbers, l, r, f, c, rate) < 0) || is_admissible(numbers, l, r, f, rate)) return false;
     set(limited_flux(numbers, l, r, f, jump, rate), F, step);
     return true;
