@@ -202,7 +202,7 @@ def test_ranks_change_no_byte_of_the_history(tmp_path):
         words = ["-m", "distfsi", tmp_path / "scene.toml", "--set", f'output.directory="{out}"']
         run_ranks(ranks, [*words, "--set", "time.maximum_steps=30", "--set", "output.history_every=1"], 120.0)
         tables.append((out / "history.csv").read_bytes())
-    assert tables[0] == tables[1] and b"held by unburnt [J]" in tables[0]
+    assert tables[0] == tables[1] and b"held by unburnt [J/m]" in tables[0]
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
