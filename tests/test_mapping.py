@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from distfsi.commands.line import main
 from distfsi.coordinates import coordinates_of
 from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
@@ -269,6 +270,9 @@ def test_stages_lead_from_one_dimension_to_three(tmp_path, capsys):
     path.write_text(STAGES)
     scene = load(path, [f"output.directory={tmp_path / 'out'}"])
     assert [stage.domain.dimensions for stage in scene.stages] == [1, 2]
+    main(["check", str(path)])
+    report = capsys.readouterr().out
+    assert "symmetry   spherical" in report and "symmetry   axisymmetric" in report and "is nowhere" not in report
     octant = run(scene, Communicator(), 1)
     printed = capsys.readouterr().out
     assert printed.count("mapped from") == 2

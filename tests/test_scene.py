@@ -299,6 +299,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "gauges",
             "coupling",
             "performance",
+            "stages",
         )
     )
     assert faults(BROKEN) == [

@@ -24,7 +24,8 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     yield from _shape_of_cells(scene.domain)
     if scene.output.fields_every > scene.time.end:
         yield "output.fields_every is longer than the run: only the first and the last fields are written"
-    if layout:
+    mapped = scene.fluid is not None and scene.fluid.map is not None  # then regions do not tell what happens
+    if layout and not mapped:
         yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
     yield from warnings(scene)
@@ -32,7 +33,8 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
     yield from _excess_cells(scene)
-    yield from _excess_dimensions(scene)
+    if not mapped:
+        yield from _excess_dimensions(scene)
 
 
 def _shape_of_cells(domain: Domain) -> Iterator[str]:
