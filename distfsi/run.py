@@ -36,6 +36,7 @@ from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import Restart, find_restart
 from distfsi.output.storage import on_root, storage
 from distfsi.scene.description import Scene
+from distfsi.scene.warnings import warnings
 from distfsi.simulation import Simulation, threads_of_rank
 from distfsi.step import parts_of
 
@@ -73,7 +74,9 @@ def _refuse(faults: list[str], communicator: Communicator) -> None:
 def compile_kernels(scene: Scene, communicator: Communicator) -> int:
     """Compile what the first steps of a scene need; how many kernels were not yet on disk. Nothing is written."""
     _refuse(cache_faults(), communicator)
-    simulation = Simulation.of(scene, communicator)
+    for stage in scene.stages:
+        compile_kernels(stage, communicator)
+    simulation = Simulation.of(scene, communicator, resumed=True)  # from what need not be there yet
     budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
     simulation.watch()
     for _ in range(STEPS_TO_COMPILE):
@@ -98,6 +101,8 @@ def run(
     Raises on all ranks: InputError for a restart file of another scene and for a directory that is not the run's,
     OutputError, Diverged, and Stopped when a signal, the stop file or the wall-clock limit has ended the run early.
     """
+    for stage in scene.stages:
+        run(stage, communicator, threads, "auto" if restart else None, on_gpu, direct)
     started = clock.perf_counter()
     directory, output = Path(scene.output.directory), scene.output
     requests = Requests(directory / output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
@@ -106,6 +111,9 @@ def run(
     progress = Progress(scene.time.end, communicator)
     for note in scene.notes:
         progress.say(note)
+    if communicator.rank == 0:
+        for text in warnings(scene):
+            progress.say(f"warning: {text}")
     threads = threads or threads_of_rank(communicator)
     device = gpu_of_rank(communicator, direct) if on_gpu else Cpu(threads)
     timers, costs = Timers(device), None
@@ -145,6 +153,8 @@ def run(
                     records.write()
                 costs = advance(simulation, records, kept, requests, progress)
                 if costs is None:
+                    if scene.domain.coordinates.radial:
+                        records.write_restart(kept)  # another run may go on from it in more dimensions
                     break
                 snapshots = {name: part.snapshot() for name, part in kept.items()}
                 origin = Handover(simulation.time, simulation.steps, records.restart, snapshots)

@@ -202,9 +202,10 @@ def advance_stage(fluid: Fluid, stage: Stage, dt: float, timers: Timers) -> None
         fluid.start_exchange(stage)
     with timers("stage"):  # reconstruction, flux, update and relaxation: Eqs. 11-30
         fluid.begin_stage()
+        fluid.account_force(stage, dt)
         fluid.advance_tiles(fluid.ready_tiles, stage, dt)
     with timers("exchange"):
-        fluid.exchange.finish()
+        fluid.finish_exchange()
     with timers("stage"):
         fluid.advance_tiles(fluid.waiting_tiles, stage, dt)
         fluid.end_stage(stage)

@@ -230,6 +230,7 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     """The columns of a table as text, in which floats have all their bits; without where particles are."""
     with path.open(newline="") as file:
         header, *rows = csv.reader(WHOSE_PARTICLE.sub("", line) for line in file)
+    header = [re.sub(r"(kg|N s|J|N)/m2?\]", r"\1]", name) for name in header]  # units that the table does not have
     return {name: np.array([row[i].encode() for row in rows], "S") for i, name in enumerate(header)}
 
 

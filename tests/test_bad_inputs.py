@@ -162,8 +162,12 @@ def test_a_wrong_command_line_is_refused(tmp_path, monkeypatch, words):
 
 # ---- any mutation ----------------------------------------------------------------------------------------------------
 
-NUMBERS = st.integers(-3, 10**13) | st.floats() | st.sampled_from([0, -0.0, 1e300, -1e300, 1e-300])
-TEXTS = st.sampled_from(["", "wall", "1 mm", "-3 GPa", "1e999 m", "9" * 400, "none", "box", "µ", "1 m/", "["])
+NUMBERS = (
+    st.integers(-3, 10**13) | st.floats() | st.sampled_from([0, -0.0, 1e300, -1e300, 1e-300, 5e-324, 10**30, 10**400])
+)
+TEXTS = st.sampled_from(
+    ["", "wall", "1 mm", "-3 GPa", "1e999 m", "9" * 400, "none", "box", "µ", "1 m/", "[", "x" * 300, "JWL"]
+)
 SCALARS = NUMBERS | TEXTS | st.booleans()
 VALUES = st.recursive(
     SCALARS,

@@ -170,6 +170,21 @@ def test_elastic_discs_bounce(form, angle):
     assert energy(part) == pytest.approx(whole, rel=1e-12)
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_five_discs_in_a_row_pass_the_impulse_on(form):
+    """Newton's cradle: four at rest that touch, and one that comes with 2 % of the sound speed, 20 particles across."""
+    discs = [
+        replace(body(Ball((0.4 * i - 0.8, 0.0), 0.2), 0.02, 1000.0, (0.0, 0.0), SOFT_EOS, SOFT), packing="rings")
+        for i in range(1, 5)
+    ]
+    first = replace(discs[0], shape=Ball((-0.82, 0.0), 0.2), velocity=(0.02, 0.0))
+    part = solid([first, *discs], (-1.2, -1.0), (1.2, 1.0), form=form)
+    run_until(part, 6.0)
+    velocities = [np.divide(*momenta(part, part.columns["body"] == b)[1::-1])[0] / 0.02 for b in range(5)]
+    assert velocities[4] > 0.9
+    assert np.abs(velocities[:3]).max() < 0.05
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_momentum_angular_momentum_and_energy_are_kept(friction):
     """In an oblique hit of discs of different materials and spacings; friction makes them spin."""
@@ -201,31 +216,47 @@ def test_plates_with_a_gap_bear_the_stress_of_waves(form, ratio):
         assert stress[plateau].mean() == pytest.approx(0.5 * density * c * speed, rel=0.01)
 
 
-@pytest.mark.parametrize(("form", "distance"), [(FORMS[0], 8.95e-3), (FORMS[1], 9.6e-3)])
-@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)], ids=["x", "xy", "xyz"])
-@pytest.mark.full
-def test_steel_balls_do_not_pass_each_other(tmp_path, form, distance, way):
-    """At 424 m/s each, five particles across a radius, they end equally far from each other in all directions."""
-    n = np.array(way) / np.linalg.norm(way)
+def balls(form, n, speed, spacing, end):
+    """Two steel balls that meet along n; no step may be below a twentieth of the first."""
     bodies = [
         f"""[solid.bodies.{name}]
 shape = {{ kind = "ball", center = {(-sign * 0.0113137 * n).tolist()}, radius = "10 mm" }}
-velocity = {(sign * 424.264 * n).tolist()}
-spacing = "2 mm"
+velocity = {(sign * speed * n).tolist()}
+spacing = "{spacing}"
 density = 7830
 eos = {{ kind = "mie_grueneisen", c0 = 4569, s1 = 1.49, gamma0 = 2.17, a = 0.46 }}
 strength = {{ kind = "perfectly_plastic", shear_modulus = "80 GPa", yield_stress = "1 GPa" }}
 """
         for name, sign in (("a", 1.0), ("b", -1.0))
     ]
-    text = f"""domain = {{ lower = [-0.03, -0.03, -0.03], upper = [0.03, 0.03, 0.03], cells = [10, 10, 10] }}
-time = {{ end = "30 us", smallest_step = 0.05 }}
+    return f"""domain = {{ lower = [-0.03, -0.03, -0.03], upper = [0.03, 0.03, 0.03], cells = [10, 10, 10] }}
+time = {{ end = "{end}", smallest_step = 0.05 }}
 solid.form = "{form}"
 {"".join(bodies)}"""
-    simulation = Simulation.of(scene_of(tmp_path, text), Communicator(), 1)
+
+
+@pytest.mark.parametrize(("form", "distance"), [(FORMS[0], 8.95e-3), (FORMS[1], 9.6e-3)])
+@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)], ids=["x", "xy", "xyz"])
+@pytest.mark.full
+def test_steel_balls_do_not_pass_each_other(tmp_path, form, distance, way):
+    """At 424 m/s each, five particles across a radius, they end equally far from each other in all directions."""
+    n = np.array(way) / np.linalg.norm(way)
+    simulation = Simulation.of(scene_of(tmp_path, balls(form, n, 424.264, "2 mm", "30 us")), Communicator(), 1)
     run_to_end(simulation)
     first, second = (simulation.solid.body_totals(b)["center"] for b in (0, 1))
     assert np.linalg.norm(second - first) == pytest.approx(distance, rel=0.02)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_fast_balls_neither_pass_nor_hang(tmp_path, form):
+    """At 2 km/s each, four particles across a radius, along no axis of the lattice."""
+    n = np.array([1.0, 2.0, 3.0]) / math.sqrt(14.0)
+    simulation = Simulation.of(scene_of(tmp_path, balls(form, n, 2000.0, "2.5 mm", "6.4 us")), Communicator(), 1)
+    before = energy(simulation.solid)
+    run_to_end(simulation)
+    first, second = (simulation.solid.body_totals(b)["center"] for b in (0, 1))
+    assert (second - first) @ n > 5e-3
+    assert energy(simulation.solid) == pytest.approx(before, rel=1e-12)
 
 
 # ---- friction --------------------------------------------------------------------------------------------------------
@@ -303,6 +334,45 @@ def test_a_body_slides_along_a_wall_and_rests_on_it(tmp_path):
         simulation.step()
     velocity = simulation.solid.columns["velocity"]
     assert np.abs(velocity - [1.0, 0.0]).max() < 1e-13
+
+
+@pytest.mark.full
+def test_a_pile_in_a_box_comes_to_rest(tmp_path):
+    """Nine discs and boxes that fall on each other, with friction between them: energy does not grow, and none gets
+    out."""
+    random, bodies = np.random.default_rng(3), []
+    for n in range(9):
+        x, y = np.array([0.2 + 0.3 * (n % 3), 0.18 + 0.34 * (n // 3)]) + random.uniform(-0.02, 0.02, 2)
+        disc = f'{{ kind = "ball", center = [{x}, {y}], radius = 0.12 }}'
+        box = f'{{ kind = "box", lower = [{x - 0.1}, {y - 0.09}], upper = [{x + 0.1}, {y + 0.09}] }}'
+        bodies.append(f"""[solid.bodies.b{n}]
+shape = {disc if n % 2 else box}
+spacing = 0.03
+density = 1000
+velocity = [{random.uniform(-0.5, 0.5)}, -1]
+eos = {{ kind = "linear", bulk_modulus = 2e6 }}
+strength = {{ kind = "elastic", shear_modulus = 1e6 }}
+""")
+    ends = 'x = ["wall", "wall"], y = ["wall", "outflow"]'
+    text = f"""domain = {{ lower = [0, 0], upper = [1, 1.4], cells = [20, 28], {ends} }}
+time.end = 2
+solid.friction = 0.3
+sources.g = {{ kind = "gravity", acceleration = [0, -10] }}
+{"".join(bodies)}"""
+    simulation = Simulation.of(scene_of(tmp_path, text), Communicator(), 1)
+    part = simulation.solid
+
+    def whole():
+        return energy(part) + 10.0 * (part.columns["mass"] * part.columns["position"][:, 1]).sum()
+
+    before = whole()
+    while not simulation.done:
+        simulation.step()
+        if simulation.steps % 100 == 0:
+            assert whole() < 1.0005 * before  # positions and velocities are half a step apart
+    x = part.columns["position"]
+    assert part.totals()["kinetic"] < 0.005 * before
+    assert (x > 0.0).all() and (x[:, 0] < 1.0).all()
 
 
 # ---- the clock -------------------------------------------------------------------------------------------------------

@@ -101,6 +101,7 @@ GAUGES = (
     "gauges.across={kind='plane', axis='y', position='1 mm', every='0.2 us'}",
     "gauges.marked={kind='particle', body='tube', position=['-29 mm', 0]}",
     "gauges.tube={kind='body', body='tube'}",
+    "gauges.end={kind='surface', side='x_high', every='0.2 us'}",
 )
 COARSE = ("domain.cells=[96,96]", "solid.bodies.tube.spacing=1.2 mm", "time.end=1.2 us")
 FIELDS = ("output.peaks=true", "output.schlieren=true", "output.fields_every=0.4 us")
@@ -120,11 +121,11 @@ def tubes(tmp_path_factory):
 
 def test_gauges_do_not_depend_on_the_ranks(tubes):
     """CSV files to the byte; plane slices and derived fields to the bit."""
-    names = ("inside", "wall", "line", "marked", "tube")
+    names = ("inside", "wall", "line", "marked", "tube", "end")
     for name in names:
         one, two = ((tubes[ranks] / f"gauges/{name}.csv").read_bytes() for ranks in (1, 2))
         assert one == two and one.count(b"\n") > 3
-    for folder in (".", "gauges/across"):
+    for folder in (".", "gauges/across", "gauges/end"):
         files = [series(tubes[ranks] / folder, "cells") for ranks in (1, 2)]
         assert [time for time, _ in files[0]] == [time for time, _ in files[1]]
         for (_, one), (_, two) in zip(*files, strict=True):
@@ -138,9 +139,9 @@ def test_the_force_on_a_body_is_its_rate_of_momentum(tubes):
     gauge = read_history(tubes[1] / "gauges/tube.csv")
     dt = np.diff(gauge["time [s]"])
     for axis in "xy":
-        force, momentum = gauge[f"force_{axis} [N]"], gauge[f"momentum_{axis} [N s]"]
+        force, momentum = gauge[f"force_{axis} [N/m]"], gauge[f"momentum_{axis} [N s/m]"]
         assert np.isnan(force[0]) and momentum[0] == 0.0
-        scale = np.abs(gauge["momentum_x [N s]"]).max()
+        scale = np.abs(gauge["momentum_x [N s/m]"]).max()
         assert np.abs(np.diff(momentum) - force[1:] * dt).max() < 1e-9 * scale
     moved = np.cumsum(gauge["velocity_x [m/s]"][:-1] * dt)
     assert gauge["displacement_x [m]"][1:] == pytest.approx(moved, rel=1e-6, abs=1e-12)
@@ -381,7 +382,7 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
         (
             ["gauges.a={kind='pont', position=0}"],
-            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'particle', 'plane', 'line'; "
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'particle', 'plane', 'line'; "
             "did you mean 'point'?",
         ),
         (
@@ -410,3 +411,65 @@ def test_faults_of_names():
         "steel_tube_full.toml: gauges.a.body (--set): 'tub' is no body; expected one of 'tube'; did you mean 'tube'?",
         "steel_tube_full.toml: gauges.b/c (--set): is no name for a file; expected letters, digits, - and _",
     ]
+
+
+# ---- what a blast does -----------------------------------------------------------------------------------------------
+
+
+def test_overpressure_and_impulse_of_a_point(sod):
+    """Above the ambient 0.1: the exact plateau, and its integral since the shock came."""
+    gauge = read_history(sod / "gauges/point.csv")
+    assert np.array_equal(gauge["overpressure [Pa]"], gauge["pressure [Pa]"] - 0.1)
+    exact = (STAR - 0.1) * (0.2 - 0.15 / SHOCK)
+    assert gauge["impulse [Pa s]"][-1] == pytest.approx(exact, rel=0.01)
+    line = read_history(sod / "gauges/line.csv")
+    assert line["impulse [Pa s]"][:3] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def wall(tmp_path_factory):
+    """Directory of a plane wave that a wall stops, in two dimensions; stopped and gone on with on the way."""
+    directory = tmp_path_factory.mktemp("wall")
+    words = [
+        "domain.lower=[0, 0]",
+        "domain.upper=[1, 0.05]",
+        "domain.cells=[100, 5]",
+        "performance.block_cells=[32, 4]",
+        "domain.x=['outflow', 'wall']",
+        "domain.y=['wall', 'wall']",
+        f'output.directory="{directory}"',
+        "fluid.regions.1.shape={kind='box', lower=[0.5, -1], upper=[2, 1]}",
+        "time.end=0.35",
+        "gauges.face={kind='surface', side='x_high', every=0.1}",
+        "gauges.point={kind='point', position=[0.995, 0.025]}",
+    ]
+    run(load(SOD, words), Communicator(), threads=1)
+    return directory
+
+
+def test_the_load_on_a_wall(wall):
+    """Force and impulse are those of a point at the wall times its area; so are the maps."""
+    face, point = (read_history(wall / f"gauges/{name}.csv") for name in ("face", "point"))
+    at = np.searchsorted(point["time [s]"], face["time [s]"])
+    over = point["pressure [Pa]"] - 1.0  # ambient: the first region's
+    assert face["force [N/m]"] == pytest.approx(0.05 * over[at], rel=1e-9)
+    assert face["impulse [N s/m]"] == pytest.approx(0.05 * point["impulse [Pa s]"][at], rel=1e-9, abs=1e-15)
+    assert face["peak_overpressure [Pa]"] == pytest.approx(np.maximum.accumulate(np.maximum(over, 0.0))[at], abs=1e-12)
+    _, fields, _, _ = read_cells(series(wall / "gauges/face", "cells")[-1][1])
+    assert fields["impulse"].shape == (1, 5, 1)
+    assert fields["impulse"].ravel() == pytest.approx(point["impulse [Pa s]"][at[-1]], rel=1e-9)
+    assert set(fields) == {"overpressure", "peak_overpressure", "impulse"}
+
+
+def test_a_surface_has_two_dimensions(tmp_path):
+    with pytest.raises(InputError, match="'x_low' in a domain of 1 dimension"):
+        load(SOD, ["gauges.a={kind='surface', side='x_low'}"])
+
+
+def test_the_impulse_on_a_body_is_that_of_its_force(tubes):
+    gauge = read_history(tubes[1] / "gauges/tube.csv")
+    dt = np.diff(gauge["time [s]"])
+    for axis in "xy":
+        force, impulse = gauge[f"force_{axis} [N/m]"], gauge[f"impulse_{axis} [N s/m]"]
+        assert impulse[0] == 0.0
+        assert np.cumsum(force[1:] * dt) == pytest.approx(impulse[1:], rel=1e-9, abs=1e-9 * np.abs(impulse).max())

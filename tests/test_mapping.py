@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from distfsi.coordinates import coordinates_of
 from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
 from distfsi.fluid.mapping import shell_parts
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, series
+from distfsi.output.history import read_history
+from distfsi.output.restart import Restart, newest_restart
 from distfsi.run import run
 from distfsi.scene import load, overlaps
 from distfsi.simulation import Simulation
@@ -206,3 +209,149 @@ def test_what_does_not_fit_is_refused(finished, tmp_path):
     single = load(tmp_path / "target.toml", ["fluid.precision=float32"])
     with pytest.raises(InputError, match=r"fluid.precision: only float64 can be mapped"):
         Simulation.of(single, Communicator(), 1)
+
+
+def test_ranks_map_the_same_bits(finished, tmp_path, mpiexec):
+    """On two ranks, and the run says what it has mapped."""
+    target(tmp_path, finished["spherical"], "planar", TARGETS["spherical", "planar"])
+    sizes = ("--set", "performance.block_cells=[7, 8, 6]", "--set", "performance.tile_cells=[7, 4, 3]")
+    found = []
+    for ranks in (1, 2):
+        words = ("--threads", 1, *sizes, "--set", f"output.directory={tmp_path / str(ranks)}")
+        printed = mpiexec(ranks, "-m", "distfsi", "run", tmp_path / "target.toml", *words)
+        assert printed.count("mapped from") == 1 and "radial momentum [N s]" in printed
+        found.append(read_cells(series(tmp_path / str(ranks), "cells")[-1][1])[1])
+    for name, values in found[0].items():
+        np.testing.assert_array_equal(found[1][name], values)
+
+
+# ---- stages ----------------------------------------------------------------------------------------------------------
+
+STAGES = (
+    """
+title = "a sphere, its wave around an axis, and in an octant"
+[domain]
+lower = [0, 0, 0]
+upper = [0.4, 0.4, 0.4]
+cells = [12, 12, 12]
+x = ["symmetry", "outflow"]
+y = ["symmetry", "outflow"]
+z = ["symmetry", "outflow"]
+[time]
+end = 2.2e-5
+"""
+    + PHASES.replace("[[fluid", "[fluid.map]\ncenter = [0, 0, 0]\n[[fluid")
+    + """
+[[stages]]
+domain = { symmetry = "spherical", lower = 0, upper = 0.3, cells = 60, x = ["axis", "outflow"] }
+time = { end = 1e-5 }
+regions = [
+  { phase = "gas", density = 1.2, pressure = 1e5 },
+  { phase = "charge", density = 1630, pressure = 8e9, shape = { kind = "ball", center = 0, radius = 0.05 } },
+]
+[[stages]]
+time = { end = 1.6e-5 }
+regions = [{ phase = "gas", density = 1.2, pressure = 1e5 }]
+[stages.domain]
+symmetry = "axisymmetric"
+lower = [0, 0]
+upper = [0.35, 0.35]
+cells = [21, 21]
+x = ["axis", "outflow"]
+y = ["symmetry", "outflow"]
+"""
+)
+
+
+def test_stages_lead_from_one_dimension_to_three(tmp_path, capsys):
+    """One input: a sphere, (r, z), an octant; totals at both links to 1e-12."""
+    path = tmp_path / "scene.toml"
+    path.write_text(STAGES)
+    scene = load(path, [f"output.directory={tmp_path / 'out'}"])
+    assert [stage.domain.dimensions for stage in scene.stages] == [1, 2]
+    octant = run(scene, Communicator(), 1)
+    printed = capsys.readouterr().out
+    assert printed.count("mapped from") == 2
+    np.testing.assert_allclose(octant.fluid.mapping.after, octant.fluid.mapping.before, rtol=1e-12)
+    # a quarter of the half that lies in (r, z)
+    _, half, *_ = (read_history(tmp_path / f"out-stage-{n}" / "history.csv") for n in (1, 2))
+    assert octant.time == pytest.approx(2.2e-5)
+    assert octant.fluid.mapping.before[1] == pytest.approx(half["fluid mass_2 [kg]"][-1] / 4.0, rel=1e-3)
+
+
+def test_faults_of_a_stage_are_told_with_their_keys(tmp_path):
+    """Those of the scene beside them."""
+    path = tmp_path / "scene.toml"
+    path.write_text(STAGES)
+    words = ["stages.0.domain.cells=0", "stages.1.domain.symmetry=spherical", "stages.1.time.end=-1", "time.cfl=2"]
+    with pytest.raises(InputError) as found:
+        load(path, words)
+    told = "\n".join(found.value.faults)
+    for key in ("stages.0.domain.cells", "stages.1.domain.symmetry", "stages.1.time.end", "time.cfl"):
+        assert key in told, told
+
+
+BURNING = """
+[domain]
+symmetry = "axisymmetric"
+lower = [0, 0]
+upper = ["80 mm", "80 mm"]
+cells = [16, 16]
+x = ["axis", "outflow"]
+y = ["symmetry", "outflow"]
+[time]
+end = "12 us"
+[fluid.phases.air]
+material = "air"
+[fluid.phases.charge]
+material = "TNT"
+[[fluid.regions]]
+phase = "air"
+[fluid.detonation]
+phase = "charge"
+[[fluid.detonation.detonators]]
+kind = "point"
+position = [0, 0]
+[fluid.afterburn]
+phase = "charge"
+law = { kind = "miller", energy = "10 MJ/kg", rate = "2e4 1/s" }
+[[stages]]
+domain = { symmetry = "spherical", lower = 0, upper = "70 mm", cells = 70, x = ["axis", "outflow"] }
+time = { end = "4 us" }
+detonators = [{ kind = "point", position = 0 }]
+regions = [{ phase = "air" }, { phase = "charge", shape = { kind = "ball", center = 0, radius = "50 mm" } }]
+"""
+
+
+def test_a_charge_goes_on_burning(tmp_path):
+    """Half burnt at the end of the stage: the rest of the charge arrives unburnt and is lit on time."""
+    path = tmp_path / "scene.toml"
+    path.write_text(BURNING)
+    scene = load(path, [f"output.directory={tmp_path / 'out'}"])
+    run(scene.stages[0], Communicator(), 1)
+    sphere = Restart(newest_restart(tmp_path / "out-stage-1")).array("fluid/cells/state")[:, 0, 0]
+    faces = np.linspace(0.0, 0.07, 71)
+    shell = coordinates_of("spherical").volume(faces[:-1], faces[1:])
+    simulation = Simulation.of(scene, Communicator(), 1)
+    np.testing.assert_allclose(simulation.fluid.mapping.after, simulation.fluid.mapping.before, rtol=1e-12)
+    cells = simulation.fluid.cells(0)
+    for there, here in ((5, 6), (6, 7)):  # the masses that are unburnt, and that the afterburn has left
+        held = simulation.fluid.metrics.weighted(cells[here], 0).sum() * 0.005**2
+        assert held == pytest.approx((sphere[there] * shell).sum() / 2.0, rel=1e-12)
+    budget = Budget(simulation.fluid, None, None)
+    budget.row(simulation)
+    assert cells[6].sum() > 0.3 * cells[1].sum()  # unburnt so far
+    advance(simulation)
+    assert simulation.fluid.cells(0)[6].sum() < 1e-3 * simulation.fluid.cells(0)[1].sum()
+    row = budget.row(simulation)
+    assert abs(row["drift energy"]) < 1e-12
+
+
+def test_other_reactions_are_refused(tmp_path):
+    """What shares mean must be the same in both runs."""
+    path = tmp_path / "scene.toml"
+    path.write_text(BURNING)
+    words = [f"output.directory={tmp_path / 'out'}"]
+    run(load(path, words).stages[0], Communicator(), 1)
+    with pytest.raises(InputError, match=r"fluid.afterburn.law.rate: .*; was 20000"):
+        Simulation.of(load(path, [*words, "fluid.afterburn.law.rate=3e4"]), Communicator(), 1)

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from distfsi.coupling.cut_cells.redistribution import Redistribution
+from distfsi.device.cpu import Cpu
+from distfsi.device.gpu import Gpu
+from distfsi.device.host import HostRuntime
 from distfsi.errors import InputError
 from distfsi.mesh.communicator import Communicator
 from distfsi.scene import load
@@ -153,6 +156,21 @@ motion = { times = [0.0, 10.0], displacements = [0.0, 5.0] }
     front = 1.0 + 1.4 * (shock + math.sqrt(shock**2 + 1.0)) * speed
     back = (1.0 - 0.5 * (gamma - 1.0) * speed) ** (2.0 * gamma / (gamma - 1.0))
     assert np.mean(forces) == pytest.approx(back - front, rel=1e-2)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("text", [CHARGE + BLOCK, rotor(3.0, 2.0)], ids=["stands", "moves"])
+def test_a_gpu_has_the_bits_of_the_cpu(tmp_path, text):
+    """Its text, compiled for the host."""
+    (tmp_path / "scene.toml").write_text(SCENE + text)
+    scene, found = load(tmp_path / "scene.toml"), []
+    for device in (Cpu(1), Gpu(HostRuntime(), True)):
+        simulation = Simulation.of(scene, Communicator(), device=device)
+        for _ in range(5):
+            simulation.step()
+        found.append((simulation.fluid.state, simulation.solid.columns["position"], simulation.solid.given))
+    for first, second in zip(*found, strict=True):
+        assert np.array_equal(first, second)
 
 
 def test_a_motion_is_the_table():

@@ -98,10 +98,10 @@ def test_momentum_of_a_tube_with_its_charge_off_centre(tmp_path, riemann):
     history = read_history(directory / "history.csv")
     for name in ("momentum_x", "momentum_y"):
         assert np.abs(history[f"drift {name}"]).max() < 1e-12
-        assert np.abs(history[f"solid {name} [N s]"]).max() > 0.0
+        assert np.abs(history[f"solid {name} [N s/m]"]).max() > 0.0
     assert np.abs(history["drift energy"]).max() < 1e-12
     made = sum(history[name][-1] for name in history if name.startswith("coupling") and "energy" in name)
-    assert abs(made) < 0.05 * history["fluid energy [J]"][0]
+    assert abs(made) < 0.05 * history["fluid energy [J/m]"][0]
 
 
 def test_a_second_run_keeps_the_results_of_the_first(tmp_path, capfd):

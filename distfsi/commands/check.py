@@ -45,7 +45,8 @@ def execute(arguments: argparse.Namespace) -> None:
     from distfsi.resources.report import report
 
     threads = arguments.threads or max(1, len(os.sched_getaffinity(0)) // arguments.ranks)
-    print(report(scene, arguments.ranks, threads, kept_bench()))
+    for each in (*scene.stages, scene):
+        print(report(each, arguments.ranks, threads, kept_bench()))
     if arguments.picture is not None:
         from distfsi.resources.scene_picture import draw_scene
 

@@ -8,6 +8,7 @@ at once.
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import sys
 from collections.abc import Sequence
@@ -64,8 +65,17 @@ def parser() -> argparse.ArgumentParser:
 
 def main(words: Sequence[str]) -> None:
     """Execute the command line `words`. Raises DistfsiError, and SystemExit where ranks have told it already."""
+    if near := _mistyped(words[0] if words else ""):
+        parser().error(f"there is neither a command nor a file {words[0]!r}; did you mean the command {near!r}?")
     arguments = parser().parse_args(with_command(words))
     arguments.execute(arguments)
+
+
+def _mistyped(word: str) -> str | None:
+    """The command that a word is meant to be, if it is none, and no input file, but resembles one."""
+    if word in COMMANDS or word.startswith("-") or "." in word or os.sep in word or os.path.exists(word):
+        return None
+    return next(iter(difflib.get_close_matches(word.lower(), COMMANDS, n=1)), None)
 
 
 def with_command(words: Sequence[str]) -> list[str]:

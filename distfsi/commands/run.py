@@ -16,14 +16,16 @@ from __future__ import annotations
 import argparse
 
 from distfsi.commands.ranks import load_once, reported_once, start_ranks
-from distfsi.commands.words import add_overrides
+from distfsi.commands.words import add_overrides, positive
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what the command takes."""
     parser.add_argument("input", help="the scene, a TOML file")
     add_overrides(parser)
-    parser.add_argument("--threads", type=int, help="threads per rank (default: the node's cores shared by its ranks)")
+    parser.add_argument(
+        "--threads", type=positive, help="threads per rank (default: the node's cores shared by its ranks)"
+    )
     parser.add_argument("--gpu", action="store_true", help="compute on the node's GPUs")
     parser.add_argument(
         "--gpu-aware-mpi",

@@ -21,6 +21,7 @@ class Coordinates(Law):
     radial      whether the first axis is a distance r >= 0
     axes        names of the axes
     whole       what totals count
+    turns       of how many dimensions besides those of the domain: about an axis, about a point
     """
 
     folder = "coordinates"
@@ -28,6 +29,7 @@ class Coordinates(Law):
     radial: ClassVar[bool] = True
     axes: ClassVar[str] = "r"
     whole: ClassVar[str]
+    turns: ClassVar[int] = 1
 
     def area(self, r: Any) -> Any:
         """Area of a face normal to the first axis at r [m], per length along the second axis."""

@@ -15,6 +15,7 @@ class Planar(Coordinates):
     dimensions = (1, 2, 3)
     radial = False
     axes = "xyz"
+    turns = 0
     whole = "the domain; in fewer than three dimensions per metre along those that are left out"
 
     def area(self, r: Any) -> Any:

@@ -14,6 +14,7 @@ class Spherical(Coordinates):
     """One dimension: x is the distance r from a point, in all directions."""
 
     dimensions = (1,)
+    turns = 2
     whole = "all directions"
 
     def area(self, r: Any) -> Any:

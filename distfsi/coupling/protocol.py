@@ -44,6 +44,10 @@ class Coupling(Protocol):
         """Of what the coupling creates or takes, keys of budget_by_cause()."""
 
     @property
+    def at_ends(self) -> tuple[str, ...]:
+        """Those of the causes that pass the ends of the domain with bodies: they have come in, or left."""
+
+    @property
     def kind(self) -> DualArray:
         """Field (local blocks, 1, Z, Y, X) on host and device: at least COVERED where a cell holds no fluid, see
         coupling/kernels/cells.py."""

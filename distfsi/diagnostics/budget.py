@@ -8,16 +8,18 @@ import numpy as np
 from distfsi.coupling.protocol import Coupling
 from distfsi.diagnostics.watched import Watched
 from distfsi.fluid.fluid import Fluid
+from distfsi.gauges import per_extent
 from distfsi.mesh.blocks import Snapshot
 from distfsi.narrowing import present
 from distfsi.solid.solid import Solid
 
 AXES = "xyz"
+SLOW = 1e-3  # of the speed of sound: where all is slower, errors of the momentum are measured by this speed
 
 
 class Budget:
-    """Of a run: fluid + solid + left through boundaries - created by the coupling is constant, but for the conservation
-    error.
+    """Of a run: fluid + solid + left through boundaries - given to the fluid by the body force - created by the
+    coupling is constant, but for the conservation error.
 
     `columns` are the names of the history's columns; `row(simulation)` gives their values.
     """
@@ -26,9 +28,12 @@ class Budget:
         self.fluid, self.solid, self.coupling = fluid, solid, coupling
         self.dimensions = (fluid.blocks if fluid else present(solid).blocks).grid.dimensions
         self.phases = fluid.model.phases if fluid else 0
-        momentum = [f"momentum_{AXES[d]} [N s]" for d in range(self.dimensions)]
-        masses = [f"mass_{k + 1} [kg]" for k in range(self.phases)]
-        self.conserved = [*masses, *momentum, "energy [J]"] if fluid else [*momentum, "energy [J]"]
+        grid = (fluid.blocks if fluid else present(solid).blocks).grid
+        spanned = grid.dimensions + grid.coordinates.turns
+        self._kg, impulse, self._joule = (per_extent(unit, spanned) for unit in ("kg", "N s", "J"))
+        self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
+        masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]
+        self.conserved = [*masses, *self._momentum, f"energy [{self._joule}]"]
         self._names = {n: name.split(" [")[0] for n, name in enumerate(self.conserved)}
         if fluid and fluid.blocks.grid.coordinates.radial:  # momentum along r is not conserved: all around it is zero
             del self._names[self.phases]
@@ -37,24 +42,28 @@ class Budget:
         self.columns = ["step", "time [s]", "time step [s]", "limited by"]
         if fluid:
             self.columns += ["limited faces", "rejected steps", *(f"fluid {name}" for name in self.conserved)]
-            self.columns += [f"held by {share} [J]" for share in fluid.model.carried]
+            self.columns += [f"held by {share} [{self._joule}]" for share in fluid.model.carried]
         self.columns += [f"left {name}" for name in self.conserved]
+        if fluid and fluid.force:
+            self.columns += [f"body force {name}" for name in self.conserved]
         if solid:
             self.columns += [
-                "solid mass [kg]",
-                *(f"solid {m}" for m in momentum),
-                "solid kinetic energy [J]",
-                "solid internal energy [J]",
+                f"solid mass [{self._kg}]",
+                *(f"solid {name}" for name in self._momentum),
+                f"solid kinetic energy [{self._joule}]",
+                f"solid internal energy [{self._joule}]",
                 *(["solid pieces"] if "piece" in solid.columns else []),
             ]
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
             self.columns += [f"trapped {name}" for name in self.conserved[: self.phases]]
-            self.columns += [f"coupling {cause} {name}" for cause in coupling.causes for name in self.conserved]
+            self._created = [cause for cause in coupling.causes if cause not in coupling.at_ends]
+            self.columns += [f"coupling {cause} {name}" for cause in self._created for name in self.conserved]
         self.columns += [f"drift {name}" for name in self._names.values()]
 
     def row(self, simulation: Watched) -> dict[str, float | int | str]:
-        """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far."""
+        """Values of all columns; collective. Drifts are relative to the largest sum of absolute values so far; of the
+        momentum at least to that of a slow motion."""
         masses = self.phases
         values: dict[str, float | int | str] = {
             "step": simulation.steps,
@@ -72,33 +81,38 @@ class Budget:
         left = np.zeros(len(self.conserved))
         if self.fluid:
             totals, magnitude = self.fluid.totals(self.coupling.volume if self.coupling else None)
+            magnitude[masses:-1] += SLOW * np.sqrt(2.0 * magnitude[:masses].sum() * magnitude[-1])
             add("fluid", totals, magnitude=magnitude)
             values |= {"limited faces": self.fluid.limited_faces(), "rejected steps": self.fluid.rejected_steps}
             left = left + self.fluid.left_domain()
+            if self.fluid.force:
+                add("body force", self.fluid.force.totals(), -1.0)
             if self.fluid.model.carried:
                 energies = zip(self.fluid.model.carried, self.fluid.held_energies(), strict=True)
-                values |= {f"held by {share} [J]": float(energy) for share, energy in energies}
+                values |= {f"held by {share} [{self._joule}]": float(energy) for share, energy in energies}
         if self.solid:
             held = self.solid.totals()
             amounts = np.array([*[0.0] * masses, *held["momentum"], held["kinetic"] + held["internal"]])
             magnitude = np.abs(amounts)  # of the momentum: at most this by Cauchy and Schwarz
-            magnitude[masses:-1] = np.sqrt(2.0 * held["mass"] * held["kinetic"])
+            magnitude[masses:-1] = np.sqrt(2.0 * held["mass"] * held["kinetic"]) + SLOW * held["acoustic"]
             balance, size = balance + amounts, size + magnitude
-            values["solid mass [kg]"] = float(held["mass"])
-            values |= {f"solid momentum_{AXES[d]} [N s]": m for d, m in enumerate(held["momentum"])}
-            values["solid kinetic energy [J]"] = float(held["kinetic"])
-            values["solid internal energy [J]"] = float(held["internal"])
+            values[f"solid mass [{self._kg}]"] = float(held["mass"])
+            values |= {f"solid {name}": m for name, m in zip(self._momentum, held["momentum"], strict=True)}
+            values[f"solid kinetic energy [{self._joule}]"] = float(held["kinetic"])
+            values[f"solid internal energy [{self._joule}]"] = float(held["internal"])
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
+        made = self.coupling.budget_by_cause() if self.coupling else {}
+        left = left - sum(made[cause] for cause in (self.coupling.at_ends if self.coupling else ()))
         add("left", left)
         if self.coupling:
             step = simulation.last_step
             limit = step.name_particle(simulation.communicator) if step.sub_steps > 1 else ""
             values |= {"sub-steps": step.sub_steps, "sub-steps limited by": limit}
             values |= {f"trapped {n}": m for n, m in zip(self.conserved, self.coupling.trapped(), strict=False)}
-            for cause, amounts in self.coupling.budget_by_cause().items():
-                add(f"coupling {cause}", amounts, -1.0)
+            for cause in self._created:
+                add(f"coupling {cause}", made[cause], -1.0)
         if np.isnan(self._start).all():
             self._start = balance
         size[masses:-1] = size[masses:-1].max()  # a component that stays near zero is measured by the others
@@ -120,6 +134,7 @@ class Budget:
         worst = max(abs(float(row[f"drift {name}"])) for name in self._names.values())
         text = f"Conservation error {worst:.1e}."
         if self.coupling:
-            energy = sum(float(row[f"coupling {cause} energy [J]"]) for cause in self.coupling.causes)
-            text += f" The coupling created {energy:.4g} J ({100 * energy / self._scale[-1]:.2g} % of the energy)."
+            energy = sum(float(row[f"coupling {cause} {self.conserved[-1]}"]) for cause in self._created)
+            share = 100 * energy / self._scale[-1]
+            text += f" The coupling created {energy:.4g} {self._joule} ({share:.2g} % of the energy)."
         return text

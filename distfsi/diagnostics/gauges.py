@@ -35,6 +35,17 @@ class SampledRun:
         return self._simulation.dt
 
     @property
+    def time(self) -> float:
+        return self._simulation.time
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        fluid, peaks = present(self._simulation.scene.fluid), self._simulation.scene.output.peaks
+        if fluid.hydrostatic_level is not None:
+            return None
+        return peaks.ambient_pressure if peaks else fluid.regions[0].state.pressure
+
+    @property
     def particles(self) -> Particles:
         return present(self._simulation.solid)
 
@@ -96,6 +107,25 @@ class LayerFiles:
         self.number += 1
 
 
+class LayerAndTable(LayerFiles):
+    """Samples of a probe as field files in the folder PATH, and rows of PATH.csv."""
+
+    def __init__(self, path: Path, probe: LayerProbe, communicator: Communicator, files: Storage):
+        super().__init__(path, probe, communicator, files)
+        self._table = TableFile(path, present(probe.table), communicator)
+
+    def faults(self, until: float) -> list[str]:
+        return super().faults(until) + self._table.faults(until)
+
+    def open(self, until: float) -> None:
+        super().open(until)
+        self._table.open(until)
+
+    def write(self, run: SampledRun, time: float) -> None:
+        super().write(run, time)
+        self._table.write(run, time)
+
+
 class GaugeRecorder:
     """Samples a run at the first step at or after each multiple of its interval; the samples are in files at once."""
 
@@ -110,7 +140,8 @@ class GaugeRecorder:
             self._files: TableFile | LayerFiles = TableFile(path, self._probe, communicator)
         elif isinstance(self._probe, LayerProbe):
             files = storage(simulation.scene.output.hdf5, communicator)
-            self._files = LayerFiles(path, self._probe, communicator, files)
+            kind = LayerAndTable if self._probe.table else LayerFiles
+            self._files = kind(path, self._probe, communicator, files)
         interval = gauge.interval(simulation.scene.time.end)
         self._each_step, self._schedule, self._last = interval == 0.0, Every(interval), 0.0
         self._goes_on = False
@@ -126,6 +157,7 @@ class GaugeRecorder:
         if self._goes_on:
             self._files.open(self._last)
             self._goes_on = False
+        self._probe.see(self._run)
         if self._each_step or self._schedule.due(simulation.time):
             self._last = simulation.time
             self._files.write(self._run, simulation.time)

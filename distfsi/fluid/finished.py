@@ -16,7 +16,7 @@ from distfsi.output.scene_text import describe
 from distfsi.scene.description import Scene
 
 PHASE = "fluid.phases."
-REACTIONS = {"fluid.detonation": "a detonation", "fluid.afterburn": "an afterburn"}
+CARRIED = ("fluid.detonation.burn", "fluid.afterburn.law")  # what the shares mean that a phase carries
 
 
 class FinishedRun:
@@ -28,9 +28,9 @@ class FinishedRun:
     layers       (layers + 1,) edges along z [m], None in one dimension
     names        of this scene's phases
     phases       how many they are
-    fractions    1 with two phases, else 0
+    extra        how many rows stand behind the energy
     contents     (rows + 1, layers or 1, shells): masses, momentum along r (and z), energy, volume fraction of the first
-                 of two phases, masses of the shares that a phase carries, and 1, per volume
+                 of two phases, masses of the shares that one carries, and 1, per volume
     """
 
     def __init__(self, run: str, scene: Scene):
@@ -47,14 +47,15 @@ class FinishedRun:
         edges = [a + (b - a) / n * np.arange(n + 1) for a, b, n in zip(lower, upper, cells, strict=True)]
         self.edges, self.layers = edges[0], edges[1] if len(edges) > 1 else None
         self.names = [phase.name for phase in fluid.phases]
-        self.phases, self.fractions = len(self.names), int(len(self.names) == 2)
+        self.phases = len(self.names)
         self._check_phases(scene)
         self.contents = self._arranged(restart.array("fluid/cells/state")[:, 0].astype(np.float64), scene)
+        self.extra = self.rows - self.phases - len(self.coordinates.axes) - 1
 
     @property
-    def conserved(self) -> int:
-        """Rows of masses, momentum and energy."""
-        return self.phases + len(self.coordinates.axes) + 1
+    def rows(self) -> int:
+        """Rows of the contents but for the last one."""
+        return len(self.contents) - 1
 
     def _coordinates(self) -> Coordinates:
         """Raises InputError unless they are radial."""
@@ -76,16 +77,12 @@ class FinishedRun:
         for name in self._names_there:
             if name not in self.names:
                 faults.append(f"fluid.phases: has no '{name}', which {self.path} holds")
-                continue
-            keys = {key for known in (here, self._there) for key in known if key.startswith(f"{PHASE}{name}.eos")}
-            faults += [
-                f"{key}: {here.get(key, 'absent')}; was {self._there.get(key, 'absent')} in {self.path}"
-                for key in sorted(keys)
-                if here.get(key) != self._there.get(key)
-            ]
-        for key, words in REACTIONS.items():
-            if (here[key] == repr(None)) != (self._there.get(key, repr(None)) == repr(None)):
-                faults.append(f"{key}: {self.path} and this scene must both have {words}, or neither")
+        alike = (*(f"{PHASE}{name}.eos" for name in self._names_there), *CARRIED)
+        faults += [
+            f"{key}: {here.get(key, 'absent')}; was {self._there.get(key, 'absent')} in {self.path}"
+            for key in sorted(here.keys() | self._there.keys())
+            if key.startswith(alike) and here.get(key) != self._there.get(key)
+        ]
         if any(known["fluid.precision"] != repr("float64") for known in (here, self._there)):
             faults.append("fluid.precision: only float64 can be mapped, not yet float32")
         if faults:
@@ -96,17 +93,15 @@ class FinishedRun:
         there, fluid = self._names_there, present(scene.fluid)
         P = len(there)
         masses = {name: state[k] for k, name in enumerate(there)}
-        D = len(self.coordinates.axes)
-        first = state[P + D + 1] if P == 2 else np.ones(state.shape[1:])
-        fraction = {there[0]: first} | ({there[1]: 1.0 - first} if P == 2 else {})
-        if self.fractions and P == 1:
+        energy = P + len(self.coordinates.axes)
+        first = state[energy + 1] if P == 2 else np.ones(state.shape[1:])
+        fraction = {there[-1]: 1.0 - first} | {there[0]: first}
+        if self.phases == 2 and P == 1:
             (other,) = set(self.names) - set(there)
             trace = fluid.minimum_volume_fraction
             density = next(r.state.density for r in fluid.regions if self.names[r.state.phase] == other)
             masses[other] = np.full(state.shape[1:], trace * density)
             fraction = {there[0]: fraction[there[0]] - trace, other: np.full(state.shape[1:], trace)}
-        motion_and_energy = state[P : P + D + 1]
-        rows = [*(masses[name] for name in self.names), *motion_and_energy]
-        rows += [fraction[self.names[0]]] if self.fractions else []
-        rows += [*state[P + D + 2 :]]
-        return np.stack([*rows, np.ones(state.shape[1:])])
+        rows = [*(masses[name] for name in self.names), *state[P : energy + 1]]
+        rows += [fraction[self.names[0]]] if self.phases == 2 else []
+        return np.stack([*rows, *state[energy + 1 + (P == 2) :], np.ones(state.shape[1:])])

@@ -9,6 +9,8 @@ import numpy as np
 from distfsi.device.interface import Device, DualArray
 from distfsi.errors import Diverged
 from distfsi.fluid import fields
+from distfsi.fluid.force import GivenByForce
+from distfsi.fluid.hydrostatics import WeighedGhosts
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageTimes, States
 from distfsi.fluid.kernels.signals import fastest_signals
@@ -37,8 +39,9 @@ class Fluid:
     """Compressible flow on the blocks of this rank.
 
     state: (local blocks, variables, Z, Y, X) at the present time, ghosts included; replaced by another buffer in every
-    step. stages: those that make a step. ready_tiles, waiting_tiles: numbers of the tiles that need no other rank's
-    cells; of the others. mapping: what another run has left here, if this one goes on from it.
+    step. stages: those that make a step. force: what the body force has given, if there is one. ready_tiles,
+    waiting_tiles: numbers of the tiles that need no other rank's cells; of the others. mapping: what another run has
+    left here, if this one goes on from it.
     """
 
     def __init__(self, scene: Scene, model: FluidModel, blocks: Blocks, device: Device, resumed: bool = False):
@@ -50,7 +53,7 @@ class Fluid:
         real = given.precision
         self.kernels = device.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
-        initial = InitialState(given, model)
+        initial = InitialState(given, model, blocks.grid)
         self.inflow = self._inflow_states(given, initial)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
@@ -66,7 +69,10 @@ class Fluid:
         self._stages, self._calm = device.array(self.rest.stages), device.array(self.rest.calm)
         self._grid = blocks.grid_on(device)
         self._fastest = DualArray(device, np.zeros(blocks.local_count))
-        self._before = self._accounted()
+        forced = bool(model.constants["HYDROSTATIC"])
+        self.force = GivenByForce(blocks, device, model, self.metrics, real) if forced else None
+        self._weighed = WeighedGhosts(blocks, self.exchange, device, model, real) if forced else None
+        self._before = [pair.host().copy() for pair in self._accounts]
         self._signal: float | None = None
         self._volumes = DualArray(device, np.ones((1, 1, 1, 1, 1), real))
         self.rejected_steps = 0
@@ -120,13 +126,13 @@ class Fluid:
 
     def begin_step(self) -> None:
         """Remember what `reject` must bring back besides the state."""
-        self._before = self._accounted()
+        self._before = [pair.host().copy() for pair in self._accounts]
         self._signal = None
 
     def reject(self) -> None:
         """Go back to the state before the last step."""
         self._buffers[:2] = self._buffers[1::-1]
-        for pair, before in zip((self.tiling.through, self.tiling.limited), self._before, strict=True):
+        for pair, before in zip(self._accounts, self._before, strict=True):
             pair.host()[:] = before
             pair.changed()
         self.rejected_steps += 1
@@ -138,18 +144,34 @@ class Fluid:
         self._signal = self.fastest_signal()
         return bool(np.isfinite(self.blocks.communicator.maximum(np.array([self._signal]))[0]))
 
-    def _accounted(self) -> tuple[np.ndarray, np.ndarray]:
-        """Copies of what has left through the domain's sides, and of the number of limited faces."""
-        return self.tiling.through.host().copy(), self.tiling.limited.host().copy()
+    @property
+    def _accounts(self) -> list[DualArray]:
+        """What has left through the domain's sides, how many faces were limited, and what the body force has given."""
+        force = [self.force.sums] if self.force else []
+        return [self.tiling.through, self.tiling.limited, *force]
 
     def start_exchange(self, stage: Stage) -> None:
-        """Start to fill the ghost cells of the stage's input; `exchange.finish` ends it."""
-        self.exchange.start(self.input_of(stage), self.model.mirror, self.inflow)
+        """Start to fill the ghost cells of the stage's input; `finish_exchange` ends it."""
+        self._filled = self.input_of(stage)
+        self.exchange.start(self._filled, self.model.mirror, self.inflow)
+        if self._weighed:
+            self._weighed.weigh(self._filled, waiting=False)
+
+    def finish_exchange(self) -> None:
+        """Fill the ghost cells that wait for other ranks."""
+        self.exchange.finish()
+        if self._weighed:
+            self._weighed.weigh(self._filled, waiting=True)
 
     def exchange_ghosts(self, stage: Stage) -> None:
         """Fill the ghost cells of the stage's input."""
         self.start_exchange(stage)
-        self.exchange.finish()
+        self.finish_exchange()
+
+    def account_force(self, stage: Stage, dt: float) -> None:
+        """Account for what the body force gives in a stage of a step of `dt` [s]; before the stage."""
+        if self.force:
+            self.force.account(self.input_of(stage), self._volumes.read, self._grid, stage.weight * dt)
 
     def begin_stage(self) -> None:
         """Find out which tiles are at rest."""
@@ -231,6 +253,7 @@ class Fluid:
                 "through": self.tiling.through.host(),
                 "limited": self.tiling.limited.host().astype(np.float64),
                 "rested": self.rest.counts[None],
+                **({"force": self.force.sums.host()} if self.force else {}),
             },
             "values": {"rejected_steps": np.array(self.rejected_steps)},
         }
@@ -240,7 +263,9 @@ class Fluid:
         self.blocks.without_ghosts(self.state)[:] = snapshot["cells"]["state"]
         self.tiling.through.host()[:] = snapshot["sums"]["through"]
         self.tiling.limited.host()[:] = snapshot["sums"]["limited"]
-        for pair in (self._buffers[0], self.tiling.through, self.tiling.limited):
+        if self.force:
+            self.force.sums.host()[:] = snapshot["sums"]["force"]
+        for pair in (self._buffers[0], *self._accounts):
             pair.changed()
         self.rest.counts[:] = snapshot["sums"]["rested"].sum(axis=0)
         self.rejected_steps, self._signal = int(snapshot["values"]["rejected_steps"]), None

@@ -10,10 +10,11 @@ import numpy as np
 from distfsi.device.emit import plain
 from distfsi.fluid.formulas import relaxation, six_equation
 from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.layers import Layers, is_layer
 from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.model import FluidModel
-from distfsi.mesh.blocks import Blocks
-from distfsi.narrowing import present
+from distfsi.mesh.blocks import Blocks, Grid
+from distfsi.narrowing import of_kind, present
 from distfsi.scene.description import Fluid, FluidState, Shape
 from distfsi.scene.fractions import Filled, cell_fractions, corrected
 from distfsi.scene.shapes import bounding_box, contains, volume_within
@@ -52,9 +53,13 @@ class InitialState:
     A region is one phase. With two phases the other one is present in it, too, as much as the region's state says or as
     a trace of `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives
     for it.
+
+    layers  of those that are at rest under a body force, if that is asked for: regions with the pressure of the first
+            one then have that of their layer, on the isentropes through their states
     """
 
-    def __init__(self, fluid: Fluid, model: FluidModel):
+    def __init__(self, fluid: Fluid, model: FluidModel, grid: Grid):
+        """Raises InputError where a fluid that is to be at rest under a body force cannot be."""
         self.fluid, self.model = fluid, model
         self._conserved, self._primitives = (model.formula(name) for name in ("conserved", "primitives"))
         self._references, self._omegas = (
@@ -66,13 +71,25 @@ class InitialState:
                 plain(formula, model.constants, model.bindings)
                 for formula in (*formulas, relaxation.range_of_change, relaxation.halved_range)
             )
+        self.layers: Layers | None = None
+        if fluid.hydrostatic_level is not None:
+            self.layers = self._layers(grid, fluid.hydrostatic_level)
 
     def of(self, state: FluidState) -> np.ndarray:
         """Conserved state (variables,) of a region or an inflow."""
-        densities = [state.density] if self.model.phases == 1 else self._densities(state)
-        fraction = [] if self.model.phases == 1 else [self._fraction(state)]
+        return self._at_pressures(state, np.array([state.pressure]))[:, 0]
+
+    def _at_pressures(self, state: FluidState, pressures: np.ndarray) -> np.ndarray:
+        """Conserved states (variables, n) on the isentropes through a `state`, at pressures (n,) [Pa]."""
+        densities = [self._on_isentrope(state.phase, state, pressures)]
+        fraction = []
+        if self.model.phases == 2:
+            trace = self._beside(state, pressures)
+            densities = [*densities, trace] if state.phase == 0 else [trace, *densities]
+            fraction = [self._fraction(state)]
         shares = [1.0 if state.phase == self.model.constants["CARRIER"] else 0.0] * len(self.model.carried)
-        return np.array(self._conserved((*densities, *state.velocity, state.pressure, *fraction, *shares)), dtype=float)
+        conserved = self._conserved((*densities, *state.velocity, pressures, *fraction, *shares))
+        return np.array([np.broadcast_to(values, pressures.shape) for values in conserved], dtype=float)
 
     def paint(self, blocks: Blocks, field: np.ndarray, mapping: Mapping | None = None) -> None:
         """Collective. Fill the active cells of `field` (local blocks, variables, Z, Y, X). A cell that a region covers
@@ -80,30 +97,65 @@ class InitialState:
         it. What is mapped comes over the first region."""
         ghosts = blocks.grid.ghosts[::-1]
         for number, region in enumerate(self.fluid.regions):
-            state = self.of(region.state)
-            parts = (
-                [np.ones((1, 1, 1))] * blocks.local_count if region.shape is None else fractions(blocks, region.shape)
-            )
+            states = self._states(region.state)
+            whole = [np.ones((1, 1, 1))] * blocks.local_count
+            parts = whole if region.shape is None else fractions(blocks, region.shape)
             for block, part in enumerate(parts):
                 active = (slice(g, g + n) for g, n in zip(ghosts, blocks.extent[block][::-1], strict=True))
                 where: tuple[Any, ...] = (block, slice(None), *active)
                 if part is not None:
-                    self._lay_over(field[where], state, part)
+                    new = self._in_block(states, blocks.origin[block], blocks.extent[block])
+                    self._lay_over(field[where], new, part)
                 if mapping and number == 0:
                     mapping.apply(block, field[where])
         if mapping:
             mapping.sum_up()
 
-    def _lay_over(self, cells: np.ndarray, state: np.ndarray, part: np.ndarray) -> None:
-        """Let a region of `state` (variables,) fill a `part` (z, y, x) of each of `cells` (variables, z, y, x)."""
-        new = state[:, None, None, None]
+    def _states(self, state: FluidState) -> np.ndarray:
+        """Conserved states (variables, n) of a region in each layer, or (variables, 1) of one that has no layers."""
+        if self.layers is None or state.pressure != self.fluid.regions[0].state.pressure:
+            return self.of(state)[:, None]
+        return self._at_pressures(state, self.layers.pressures)
+
+    def _in_block(self, states: np.ndarray, origin: np.ndarray, extent: np.ndarray) -> np.ndarray:
+        """The states of a region beside the cells (variables, z, y, x) of a block."""
+        if self.layers is None or states.shape[1] == 1:
+            return states[:, :1, None, None]
+        chosen, shape = self.layers.of(int(origin[self.layers.axis]), int(extent[self.layers.axis]))
+        return states[:, chosen].reshape(-1, *shape)
+
+    def _lay_over(self, cells: np.ndarray, new: np.ndarray, part: np.ndarray) -> None:
+        """Let `new` states, as wide as `cells` (variables, z, y, x) or 1, fill a `part` (z, y, x) of each."""
         mixed = part * new + (1.0 - part) * cells
         if self.model.phases == 2:
             cut = np.argwhere((part > 0.0) & (part < 1.0))
-            alike = self._alike(state[:, None], cells[:, *cut.T])
+            here = np.broadcast_to(new, cells.shape)
+            alike = self._alike(here[:, *cut.T], cells[:, *cut.T])
             for at in map(tuple, cut[~alike]):
-                mixed[:, *at] = self._mixed(state, cells[:, *at], part[at])
+                mixed[:, *at] = self._mixed(here[:, *at], cells[:, *at], part[at])
         cells[:] = np.where(part == 1.0, new, np.where(part == 0.0, cells, mixed))
+
+    def _layers(self, grid: Grid, level: float) -> Layers:
+        """The pressures of the regions that lie across the domain and have the pressure of the first one."""
+        first, forces = self.fluid.regions[0].state, enumerate(self.model.body_force.acceleration)
+        ((axis, force),) = [(axis, of_kind(float, force)) for axis, force in forces if force != 0.0]
+        middle = [np.array([0.5 * (a + b)]) for a, b in zip(grid.lower, grid.upper, strict=True)][: grid.dimensions]
+        middle[axis] = grid.lower[axis] + (np.arange(grid.cells[axis]) + 0.5) * grid.spacing[axis]
+        centers, spacing = tuple(middle), grid.spacing[: grid.dimensions]
+        across = [
+            (region.state, 1.0 if region.shape is None else cell_fractions(region.shape, centers, spacing).ravel())
+            for region in self.fluid.regions
+            if region.state.pressure == first.pressure and is_layer(region.shape, axis, grid)
+        ]
+
+        def densities_of(pressures: np.ndarray) -> np.ndarray:
+            found = np.zeros_like(pressures)
+            for state, part in across:
+                masses = self._at_pressures(state, pressures)[: self.model.phases]
+                found = part * masses.sum(axis=0) + (1.0 - part) * found
+            return found
+
+        return Layers.at_rest(grid, (axis, force), level, first.pressure, densities_of)
 
     def _pressure(self, U: np.ndarray) -> np.ndarray:
         return self._primitives(U)[self.model.phases + self.model.dimensions]
@@ -143,8 +195,11 @@ class InitialState:
         """States (variables, n) at points (n, D) [m]."""
         states = np.empty((self.model.variables, len(positions)))
         for region in self.fluid.regions:
-            inside = np.s_[:] if region.shape is None else contains(region.shape, positions)
-            states[:, inside] = self.of(region.state)[:, None]
+            inside = np.full(len(positions), True) if region.shape is None else contains(region.shape, positions)
+            of_region = self._states(region.state)
+            if self.layers is not None and of_region.shape[1] > 1:
+                of_region = of_region[:, self.layers.index(positions[inside])]
+            states[:, inside] = of_region
         return states
 
     def _fraction(self, state: FluidState) -> float:
@@ -152,12 +207,13 @@ class InitialState:
         other = self.fluid.minimum_volume_fraction if given is None else 1.0 - given
         return 1.0 - other if state.phase == 0 else other
 
-    def _densities(self, state: FluidState) -> list[float]:
+    def _beside(self, state: FluidState, pressures: np.ndarray) -> np.ndarray:
+        """Densities (n,) of the other phase in a region of `state`, at pressures (n,)."""
         other = 1 - state.phase
         known = self._products() if self._is_explosive(other) else self._first_state(other)
-        alone = min(state.density, 0.5 * self.model.eos[other].maximum_density)
-        trace = alone if known is None else self._on_isentrope(other, known, state.pressure)
-        return [state.density, trace] if state.phase == 0 else [trace, state.density]
+        if known is None:
+            return np.full(pressures.shape, min(state.density, 0.5 * self.model.eos[other].maximum_density))
+        return self._on_isentrope(other, known, pressures)
 
     def _first_state(self, phase: int) -> FluidState | None:
         """That the scene gives for a phase."""
@@ -174,8 +230,9 @@ class InitialState:
         p = pressure(eos, burn.density, burn.energy)
         return FluidState(detonation.phase, burn.density, p, (0.0,) * self.model.dimensions)
 
-    def _on_isentrope(self, phase: int, known: FluidState, pressure: float) -> float:
-        """Density at which a phase reaches `pressure` along the isentrope through a known state: d rho/dp = 1/c^2."""
+    def _on_isentrope(self, phase: int, known: FluidState, pressures: np.ndarray) -> np.ndarray:
+        """Densities (n,) at which a phase reaches `pressures` (n,) along the isentrope through a known state:
+        d rho/dp = 1/c^2."""
         from scipy.integrate import solve_ivp
 
         reference_of, omega_of = self._references[phase], self._omegas[phase]
@@ -185,7 +242,14 @@ class InitialState:
             weight = 1.0 + rho[0] * omega_slope / omega
             return [1.0 / (gradient + (weight * (p - reference) + omega * p) / rho[0])]
 
-        if pressure == known.pressure:
-            return known.density
-        path = solve_ivp(slope, (known.pressure, pressure), [known.density], method="LSODA", rtol=1e-9, atol=1e-12)
-        return float(path.y[0, -1])
+        found, wanted = np.full(pressures.shape, known.density), np.unique(pressures)
+        for way in (wanted[wanted > known.pressure], wanted[wanted < known.pressure][::-1]):
+            if not way.size:
+                continue
+            path = solve_ivp(
+                slope, (known.pressure, way[-1]), [known.density], method="LSODA", t_eval=way, rtol=1e-9, atol=1e-12
+            )
+            reached = dict(zip(way.tolist(), path.y[0].tolist(), strict=False))
+            on_way = pressures > known.pressure if way[-1] > known.pressure else pressures < known.pressure
+            found[on_way] = [reached.get(p, np.nan) for p in pressures[on_way].tolist()]
+        return found

@@ -81,10 +81,10 @@ class Mapping:
             kinds = type(run.coordinates).__name__.lower(), type(coordinates).__name__.lower()
             raise InputError([f"fluid.map.run: {kinds[0]} in {given.run}; that does not fit into {D}D, {kinds[1]}"])
         self._shells = shells
-        self._sums = np.zeros((blocks.local_count, run.conserved))
+        self._sums = np.zeros((blocks.local_count, run.rows - run.extra))
         low, high = np.array([blocks.grid.lower[:D]]), np.array([blocks.grid.upper[:D]])
         contents = self._contents(*(corner - np.array(given.center) for corner in (low, high)))
-        self.before = contents[: run.conserved, 0]
+        self.before = contents[: run.rows - run.extra, 0]
         self.after = np.zeros_like(self.before)
 
     def apply(self, block: int, cells: np.ndarray) -> None:
@@ -108,9 +108,8 @@ class Mapping:
             new[P + axis] += given[P] * directions[:, axis]
         if run.layers is not None:
             new[P + self._along] += given[P + 1]
-        new[P + D] += given[run.conserved - 1]
-        if run.fractions:
-            new[P + D + 1 :] += given[run.conserved :]
+        new[P + D] += given[run.rows - run.extra - 1]
+        new[P + D + 1 :] += given[run.rows - run.extra :]
         flat = cells.reshape(len(cells), -1)
         flat[:, touched] = new
         cells[:] = flat.reshape(len(cells), *shape)

@@ -14,7 +14,16 @@ import numpy as np
 
 from distfsi.device.emit import plain
 from distfsi.device.source import Bound
-from distfsi.fluid.formulas import euler, five_equation, limiters, positivity, reconstruction, relaxation, riemann
+from distfsi.fluid.formulas import (
+    euler,
+    five_equation,
+    hydrostatics,
+    limiters,
+    positivity,
+    reconstruction,
+    relaxation,
+    riemann,
+)
 from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
@@ -120,6 +129,7 @@ def fluid_model(scene: Scene) -> FluidModel:
         "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
         "ASYMMETRIC": asymmetric or radial,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
+        "HYDROSTATIC": any(body_force.acceleration),
         "RADIAL": radial,
         "SHARES": 2 * dimensions + radial,
         "FRACTIONAL": scene.solid is not None and scene.coupling.scheme != "immersed_boundary",
@@ -129,6 +139,8 @@ def fluid_model(scene: Scene) -> FluidModel:
     if constants["BISECTION_FALLBACK"]:
         bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
         bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
+    if constants["HYDROSTATIC"]:
+        bindings |= {name: Bound(getattr(hydrostatics, name)) for name in ("falls", "beyond_rest")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
     positive = ("limiter_indicator", "is_admissible", "limited_flux")
     bindings |= {name: Bound(getattr(positivity, name)) for name in positive}

@@ -56,6 +56,7 @@ RADIAL = Symbol("whether the first axis is the distance from a point or an axis 
 SHARES = Symbol("parts of a cell's change that the limiter looks at: its faces, and in r what their areas differ by")
 SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
 ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
+HYDROSTATIC = Symbol("whether a body force acts, whose weight the pressures of cells beside each other differ by")
 TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
@@ -75,6 +76,8 @@ reconstructed_in_r = chosen(
     "reconstructed_in_r", "as reconstructed along r, with the nearness to both sides, and the way from the low face"
 )
 sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
+falls = chosen("falls", "time step, and that over the size of a cell along three axes -> g h along each [m2/s2]")
+beyond_rest = chosen("beyond_rest", "pressures and densities of cells around one, g h -> pressures without the weight")
 primitives = chosen("primitives", "conserved state -> primitive state")
 conserved = chosen("conserved", "primitive state -> conserved state")
 face_flux = chosen("face_flux", "left and right primitive states, normal velocity first; pressure jump -> fluxes")

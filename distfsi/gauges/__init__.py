@@ -29,6 +29,11 @@ def each_hundredth() -> Any:
     return quantity("s", "time between samples; default a hundredth of the run", default=None, above=0.0)
 
 
+def per_extent(unit: str, extents: int) -> str:
+    """A unit of what has fewer than three extents: per metre, or per square metre, of the others."""
+    return unit + ("/m2", "/m", "")[extents - 1]
+
+
 class Gauge(Law):
     """A gauge of any kind.
 
@@ -68,6 +73,40 @@ class FluidPoints(Protocol):
         """Collective. The values (n, columns) at the points now, on every rank; NaN in covered cells."""
 
 
+class PressureRecord:
+    """What a blast does at some points: overpressure and its impulse, from sample to sample by the trapezoidal rule.
+
+    Overpressure counts from the ambient pressure of the run or, where fluid lies at rest in layers, from what is there
+    at first; time without a value (nan), in a body, does not count.
+    """
+
+    columns = ("overpressure [Pa]", "impulse [Pa s]")
+
+    def __init__(self, points: int):
+        self._time, self._ambient = np.zeros(1), np.full(points, np.nan)
+        self._before, self._impulse = np.zeros(points), np.zeros(points)
+
+    def of(self, run: Run, pressures: np.ndarray) -> np.ndarray:
+        """Overpressure and impulse (n, 2) at the points, whose pressures (n,) [Pa] are sampled now."""
+        if run.ambient_pressure is not None:
+            self._ambient[:] = run.ambient_pressure
+        self._ambient = np.where(np.isnan(self._ambient), pressures, self._ambient)
+        overpressure = pressures - self._ambient
+        now = np.nan_to_num(overpressure)
+        self._impulse = self._impulse + 0.5 * (run.time - self._time) * (self._before + now)
+        self._before, self._time = now, np.array([run.time])
+        return np.stack([overpressure, self._impulse], axis=1)
+
+    def kept(self) -> Kept:
+        """What a restart needs."""
+        return {"at": self._time, "ambient": self._ambient, "before": self._before, "impulse": self._impulse}
+
+    def bring_back(self, kept: Kept) -> None:
+        """Go on from what was kept."""
+        self._time, self._ambient = kept["at"], kept["ambient"]
+        self._before, self._impulse = kept["before"], kept["impulse"]
+
+
 class Particles(Protocol):
     """The particles of this rank."""
 
@@ -98,6 +137,14 @@ class Run(Protocol):
     bodies: Sequence[str]
 
     @property
+    def time(self) -> float:
+        """[s] now."""
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        """[Pa] that overpressure counts from; None: from the pressure that is at a place when the run begins."""
+
+    @property
     def dt(self) -> float:
         """[s] of the last step; 0 before the first."""
 
@@ -114,6 +161,9 @@ class Run(Protocol):
 
 class Probe:
     """Samples a run for one gauge."""
+
+    def see(self, run: Run) -> None:
+        """Collective. Look at the state after each step, and at that at the start, before it may be sampled."""
 
     def kept(self) -> Kept:
         """What a restart needs of it, by name."""
@@ -146,6 +196,7 @@ class LayerProbe(Probe):
     """Samples are fields of some cells: those of a `layer`."""
 
     layer: Layer
+    table: TableProbe | None = None  # of what goes into a table besides
 
     def fields(self, run: Run) -> dict[str, np.ndarray]:
         """Collective. The fields of the layer's blocks now."""

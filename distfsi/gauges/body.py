@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.gauges import AXES, Gauge, Kept, Run, TableProbe, each_step
+from distfsi.gauges import AXES, Gauge, Kept, Run, TableProbe, each_step, per_extent
 from distfsi.laws.law import entry
 
-QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": "N s"}
+QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": "N s", "impulse": "N s"}
 
 
 @dataclass(frozen=True)
 class BodyGauge(Gauge):
     """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
-    mass, momentum."""
+    mass, momentum, and the impulse that the fluid has given to it so far."""
 
     body: str = entry("name of the body")
     every: float | None = each_step()
@@ -36,18 +36,26 @@ class BodyProbe(TableProbe):
 
     def __init__(self, gauge: BodyGauge, run: Run):
         axes = AXES[: run.particles.dimensions]
-        self.columns = [f"{name}_{axis} [{unit}]" for name, unit in QUANTITIES.items() for axis in axes]
+        units = {name: per_extent(unit, len(axes)) if "N" in unit else unit for name, unit in QUANTITIES.items()}
+        self.columns = [f"{name}_{axis} [{unit}]" for name, unit in units.items() for axis in axes]
         self._body = run.bodies.index(gauge.body)
-        self._start = run.particles.body_totals(self._body)["center"]
+        self._totals = run.particles.body_totals(self._body)
+        self._start = self._totals["center"]
+        self._impulse = np.zeros_like(self._start)
+
+    def see(self, run: Run) -> None:
+        self._totals = run.particles.body_totals(self._body)
+        self._impulse = self._impulse + self._totals["impulse"]
 
     def rows(self, run: Run) -> np.ndarray:
-        totals = run.particles.body_totals(self._body)
+        totals = self._totals
         force = totals["impulse"] / run.dt if run.dt > 0.0 else np.full_like(self._start, np.nan)
         velocity = totals["momentum"] / totals["mass"]
-        return np.concatenate([force, velocity, totals["center"] - self._start, totals["momentum"]])[None]
+        moved = totals["center"] - self._start
+        return np.concatenate([force, velocity, moved, totals["momentum"], self._impulse])[None]
 
     def kept(self) -> Kept:
-        return {"start": self._start}
+        return {"start": self._start, "impulse": self._impulse}
 
     def bring_back(self, kept: Kept) -> None:
-        self._start = kept["start"]
+        self._start, self._impulse = kept["start"], kept["impulse"]

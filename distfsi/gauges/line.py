@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.gauges import AXES, Gauge, Run, TableProbe, each_hundredth
+from distfsi.gauges import AXES, Gauge, Kept, PressureRecord, Run, TableProbe, each_hundredth
 from distfsi.laws.law import entry, vector
 
 
@@ -17,7 +17,7 @@ class LineGauge(Gauge):
 
     start: tuple[float, ...] = vector("m", "first point", key="from")
     end: tuple[float, ...] = vector("m", "last point", key="to")
-    points: int = entry("number of points, the ends included", at_least=2)
+    points: int = entry("number of points, the ends included", at_least=2, at_most=1_000_000)
     every: float | None = each_hundredth()
 
     per_step = False
@@ -34,8 +34,16 @@ class LineProbe(TableProbe):
 
     def __init__(self, gauge: LineGauge, run: Run):
         self._positions = np.linspace(gauge.start, gauge.end, gauge.points)
-        self._points = run.fluid_points(self._positions)
-        self.columns = [f"{axis} [m]" for axis in AXES[: self._positions.shape[1]]] + self._points.columns
+        self._points, self._record = run.fluid_points(self._positions), PressureRecord(gauge.points)
+        positions = [f"{axis} [m]" for axis in AXES[: self._positions.shape[1]]]
+        self.columns = [*positions, *self._points.columns, *PressureRecord.columns]
 
     def rows(self, run: Run) -> np.ndarray:
-        return np.hstack([self._positions, self._points.values()])
+        values = self._points.values()
+        return np.hstack([self._positions, values, self._record.of(run, values[:, 0])])
+
+    def kept(self) -> Kept:
+        return self._record.kept()
+
+    def bring_back(self, kept: Kept) -> None:
+        self._record.bring_back(kept)

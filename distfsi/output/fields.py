@@ -21,6 +21,7 @@ import numpy as np
 from distfsi.output.files import write_text
 from distfsi.output.interfaces import Blocks, Communicator, Grid
 from distfsi.output.manifest import claim, owns, remove
+from distfsi.output.quantities import UNITS
 from distfsi.output.storage import MpiIo, Piece, Storage, create_dataset, on_root, write_complete
 
 LARGEST_LAYER = 1000  # cells along an axis that a picture takes
@@ -216,10 +217,12 @@ def _fill_cells(
     if grid.coordinates.radial:
         root.attrs[AXES] = grid.coordinates.axes
     data = root.create_group("CellData")
-    return {
+    fields = {
         name: create_dataset(data, name, tuple(cells[::-1]) + parts, dtype, chunk + parts)
         for name, (parts, dtype) in shapes.items()
     }
+    _note_units(fields)
+    return fields
 
 
 def _fill_particles(count: int, shapes: Shapes, file: h5py.File, time: float) -> dict[str, h5py.Dataset]:
@@ -235,7 +238,17 @@ def _fill_particles(count: int, shapes: Shapes, file: h5py.File, time: float) ->
             root[f"{topology}/Offsets"] = np.zeros(1, dtype=np.int64)
             root[f"{topology}/Connectivity"] = np.zeros(0, dtype=np.int64)
     rows = {name: count + (name == "Vertices/Offsets") for name in shapes}
-    return {name: create_dataset(root, name, (rows[name], *parts), dtype) for name, (parts, dtype) in shapes.items()}
+    fields = {name: create_dataset(root, name, (rows[name], *parts), dtype) for name, (parts, dtype) in shapes.items()}
+    _note_units(fields)
+    return fields
+
+
+def _note_units(fields: Mapping[str, h5py.Dataset]) -> None:
+    """Datasets of quantities say their units, as text that all programs read."""
+    for name, dataset in fields.items():
+        unit = "m" if name == "Points" else UNITS.get(name.rpartition("/")[2], "")
+        if unit:
+            dataset.attrs["units"] = unit.replace("³", "3")
 
 
 def _create_root(file: h5py.File, kind: str, time: float) -> h5py.Group:

@@ -122,6 +122,18 @@ class Film:
         return low - margin, high + margin
 
 
+def as_line(frame: Frame) -> Frame | None:
+    """A frame of one row or one column of cells as one of a line; None where there are more."""
+    count = next(iter(frame.cells.values())).shape[:2] if frame.cells else (0, 0)
+    left, right, bottom, top = frame.extent
+    if count[0] == 1:
+        return replace(frame, extent=(left, right, bottom, bottom))
+    if count[1] == 1:
+        cells = {name: np.swapaxes(values, 0, 1) for name, values in frame.cells.items()}
+        return replace(frame, cells=cells, extent=(bottom, top, left, left), axes=frame.axes[::-1])
+    return None
+
+
 def mirrored(frame: Frame) -> Frame:
     """A frame of an axisymmetric run with both sides of its axis. Raises ValueError when it does not reach one."""
     left, right, bottom, top = frame.extent

@@ -119,11 +119,12 @@ def remove(path: Path) -> None:
 def in_the_way(directory: Path, gauges: Collection[str]) -> list[Path]:
     """Files of a directory that are called like those that a run with such gauges makes, but that no run has made."""
     manifest = read(directory)
-    own = set(manifest.files) | {NAME, "run.lock"} if manifest else {"run.lock"}
+    # A run may have been killed between the lock and its manifest.
+    own = {"run.lock", f"{NAME}.tmp"} | set(_with_unfinished([NAME, *manifest.files]) if manifest else ())
 
     def foreign(folder: Path, names: re.Pattern[str]) -> Iterator[Path]:
         for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-            if names.fullmatch(path.name) and path.relative_to(directory).as_posix().removesuffix(".tmp") not in own:
+            if names.fullmatch(path.name) and path.relative_to(directory).as_posix() not in own:
                 yield path
 
     table = re.compile(rf"({'|'.join(map(re.escape, gauges))})\.csv(\.tmp)?")

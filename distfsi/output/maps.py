@@ -16,7 +16,8 @@ from distfsi.narrowing import of_kind
 from distfsi.output.frames import Frame
 from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
 from distfsi.output.progress import format_time
-from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
+from distfsi.output.quantities import UNITS
+from distfsi.output.scales import label_of, largest, norm_of, scaled
 
 COLORS = {"density": "bone_r", "schlieren": "gray_r"}  # others: OTHER_COLORS
 OTHER_COLORS, PARTICLE_COLORS = "viridis", "plasma"

@@ -16,11 +16,12 @@ from matplotlib.transforms import Bbox
 from distfsi.narrowing import present
 from distfsi.output.frames import Frame
 from distfsi.output.progress import format_time
-from distfsi.output.scales import UNITS, label_of, largest, norm_of, scaled
+from distfsi.output.quantities import UNITS
+from distfsi.output.scales import label_of, largest, norm_of, scaled
 
 PROFILES = ("density", "pressure", "velocity", "volume_fraction", "plastic_strain")
 LOGARITHMIC = ("density", "pressure")  # where they span decades
-TIME_COLORS = ("0.55", "tab:blue")
+TIME_COLORS = ("0.55", "tab:blue", "tab:orange", "tab:green", "tab:red")
 ROUNDING = 1e-12  # an energy that changes by less, relatively, is not drawn
 
 WIDTH = 12.0
@@ -51,7 +52,7 @@ def draw_profiles(figure: Figure | SubFigure, frames: Sequence[Frame], fitted: S
         _draw_profile(axes, name, frames, fitted, length)
     times = [f"t = {format_time(frame.time)}" for frame in frames]
     handles = [axes.plot([], [], color=color)[0] for color, _ in zip(TIME_COLORS, frames, strict=False)]
-    rows[0].legend(handles, times, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
+    rows[0].legend(handles, times, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(frames), frameon=False)
     rows[-1].set(xlabel=f"{frames[0].names[0]} [{metres}]", xlim=(left / length, right / length))
     figure.align_ylabels(rows)
 
@@ -102,7 +103,7 @@ def draw_history(figure: Figure | SubFigure, history: Mapping[str, Any]) -> None
     step_size, step_unit = scaled("s", largest([step]))
     drifts = {name: values for name, values in history.items() if name.startswith("drift ")}
     panels = (
-        ("change of energy [J]", _changes(_energies(history))),
+        (f"change of energy [{_unit_of_energy(history)}]", _changes(_energies(history))),
         ("relative drift of totals", drifts),
         (f"time step [{step_unit}]", {"": step / step_size}),
     )
@@ -117,9 +118,14 @@ def draw_history(figure: Figure | SubFigure, history: Mapping[str, Any]) -> None
             draw_legend(axes)
 
 
+def _unit_of_energy(history: Mapping[str, np.ndarray]) -> str:
+    """Of a run in three dimensions, or per metre."""
+    return next((name.rpartition("[")[2].rstrip("]") for name in history if "energy [J" in name), "J")
+
+
 def _energies(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Energies of the parts; what the coupling creates as one."""
-    names = [name for name in history if name.endswith("energy [J]") and not name.startswith("drift ")]
+    names = [name for name in history if "energy [J" in name]
     energies = {name: history[name] for name in names if not name.startswith("coupling ")}
     created = [history[name] for name in names if name.startswith("coupling ")]
     return energies | ({"created by the coupling": np.sum(created, axis=0)} if created else {})

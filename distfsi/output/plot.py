@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from distfsi.errors import InputError
-from distfsi.output.frames import AXES, Film, Plane
+from distfsi.output.frames import AXES, Film, Plane, as_line, load_frames
 from distfsi.output.history import read_history
-from distfsi.output.maps import Colors, Sheet, cell_colors, draw_maps, particle_colors, values
+from distfsi.output.maps import Colors, Sheet, cell_colors, draw_maps, particle_colors, summary_colors, values
 from distfsi.output.panels import HISTORY_HEIGHT, WIDTH, draw_history, draw_profiles, profiles_height
 from distfsi.output.picture import STYLE
 from distfsi.output.tables import draw_gauge
@@ -21,6 +21,7 @@ from distfsi.output.tables import draw_gauge
 FOLDER = "plots"  # in the output directory
 MAP_WIDTH, MAP_HEIGHT = 8.0, 9.0  # of a sheet; of the map at most [inches]
 RESOLUTION = 100  # dots per inch
+TIMES = 5  # at which a gauge's cells are drawn, at most
 SECONDS_PER_FRAME = 0.15  # of a movie
 
 
@@ -161,7 +162,7 @@ def _write_movie(frames: Sequence[Path]) -> Path:
 
 
 def _draw_gauges(directory: Path, folder: Path) -> Iterator[Path]:
-    """A sheet per gauge with a table; the frames of those that are planes."""
+    """A sheet per gauge: curves over time, profiles or maps at some times."""
     source = directory / "gauges"
     tables, planes = sorted(source.glob("*.csv")), sorted(source.glob("*/cells.vtkhdf.series"))
     if not tables and not planes:
@@ -171,4 +172,20 @@ def _draw_gauges(directory: Path, folder: Path) -> Iterator[Path]:
         with matplotlib.rc_context(STYLE):
             yield _save(draw_gauge(table.stem, read_history(table)), folder / f"gauge-{table.stem}.png")
     for plane in planes:
-        yield from plot(plane.parent)
+        with matplotlib.rc_context(STYLE):
+            yield _save(_draw_layer(plane.parent), folder / f"gauge-{plane.parent.name}.png")
+
+
+def _draw_layer(directory: Path) -> Figure:
+    """The layer of cells of a gauge at some times: maps or, where it is a row of cells, profiles."""
+    frames = load_frames(directory, TIMES)
+    lines = [line for line in map(as_line, frames) if line]
+    if lines:
+        figure = Figure(figsize=(MAP_WIDTH, profiles_height(lines)))
+        draw_profiles(figure, lines)
+        return figure
+    fields, particles = summary_colors(frames)
+    sheet = Sheet(frames[0].aspect, len(fields), len(frames), particles is not None)
+    figure = Figure(figsize=(WIDTH, sheet.height))
+    draw_maps(figure, sheet, frames, fields, particles)
+    return figure

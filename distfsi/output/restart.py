@@ -261,8 +261,10 @@ def _misfits(
     """Collective. What a file holds otherwise than the parts of this run, of which these are snapshots."""
     cells = tuple(blocks.grid.cells[::-1])
     for part, snapshot in present.items():
-        counts = [len(array) for array in snapshot.get("particles", {}).values()]
-        rows = np.array(communicator.allgather(counts), dtype=np.int64).sum(axis=0)
+        cut = {
+            kind: {name: len(array) for name, array in snapshot.get(kind, {}).items()} for kind in ("particles", "sums")
+        }
+        every = communicator.allgather(cut)
         if part not in file:
             if not part.startswith(WATCHERS):
                 yield f"holds no '{part}'"
@@ -272,18 +274,21 @@ def _misfits(
             yield f"holds another kind of '{part}' than this run has"
             continue
         for kind, named in snapshot.items():
-            for k, (name, array) in enumerate(named.items()):
+            for name, array in named.items():
                 array, found = np.asarray(array), file[part][kind][name]
-                expected = {
-                    "cells": (*array.shape[1:-3], *cells),
-                    "particles": (int(rows[k]) if kind == "particles" else 0, *array.shape[1:]),
-                    "sums": (None, *array.shape[1:]),
-                    "values": (None,) * array.ndim,
-                }[kind]
                 if not isinstance(found, h5py.Dataset):
                     yield f"{part}/{kind}/{name} holds no values"
-                elif found.dtype != array.dtype or not _fits(found.shape, expected):
-                    was, now = f"{found.dtype} {found.shape}", f"{array.dtype} {array.shape}"
+                    continue
+                rows = sum(counts[kind][name] for counts in every) if kind in cut else 0
+                some = found.shape[0] if found.shape and min(found.shape[0], rows) > 0 else rows
+                expected = {
+                    "cells": (*array.shape[1:-3], *cells),
+                    "particles": (rows, *array.shape[1:]),
+                    "sums": (some, *array.shape[1:]),  # of blocks or tiles, of which there may be others now
+                    "values": array.shape,
+                }[kind]
+                if found.dtype != array.dtype or found.shape != expected:
+                    was, now = f"{found.dtype} {found.shape}", f"{array.dtype} {expected}"
                     yield f"{part}/{kind}/{name} is {was}, in this run {now}"
 
 
@@ -293,11 +298,6 @@ def _are_lost(positions: np.ndarray | None, blocks: Blocks) -> bool:
         return False
     size = max(n * h for n, h in zip(blocks.grid.cells, blocks.grid.spacing, strict=True))
     return not (np.abs(positions) <= FARTHEST * (size + np.abs(blocks.grid.lower).max())).all()
-
-
-def _fits(shape: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
-    """Whether a shape is the expected one, of which None stands for any number."""
-    return len(shape) == len(expected) and all(e in (n, None) for n, e in zip(shape, expected, strict=True))
 
 
 def _read_cells(dataset: h5py.Dataset, present: np.ndarray, blocks: FilledBlocks, _: Communicator) -> np.ndarray:

@@ -7,22 +7,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 
-from distfsi.laws.registry import column_units
-
-UNITS = {
-    "density": "kg/m³",
-    "pressure": "Pa",
-    "velocity": "m/s",
-    "speed": "m/s",
-    "energy": "J/kg",
-    "von_mises": "Pa",
-    "stress": "Pa",
-    "peak_overpressure": "Pa",
-    "peak_dynamic_pressure": "Pa",
-    "positive_impulse": "Pa s",
-    "arrival_time": "s",
-    **column_units(),
-}
 PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 DECADES = 100.0  # positive values whose largest and smallest differ by more get a logarithmic scale
 

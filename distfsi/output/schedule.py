@@ -19,7 +19,9 @@ class Every:
 
     def due(self, time: float) -> bool:
         """Whether output is due at `time` [s]; if so, the next one is due an interval later."""
-        multiple = math.floor(time / self._interval * (1.0 + ROUNDING)) if self._interval > 0.0 else 0.0
+        multiple = time / self._interval * (1.0 + ROUNDING) if self._interval > 0.0 else 0.0
+        if math.isfinite(multiple):  # of an interval that is almost nothing it is not
+            multiple = math.floor(multiple)
         if multiple < self.next:
             return False
         self.next = multiple + 1.0

@@ -190,7 +190,8 @@ def main(
 ) -> dict[str, Any]:
     """Run the benchmarks (those whose name holds `only`), print them as JSON on rank 0, and keep a complete bench.
 
-    SOLID_SIZES are for those who ask for them: they take much memory.
+    While it goes on standard error tells which is measured; each is kept at once, so that a bench that was interrupted
+    goes on where it ended. SOLID_SIZES are for those who ask for them: they take much memory.
     """
     result: dict[str, Any] = {
         "distfsi": __version__,
@@ -203,31 +204,48 @@ def main(
         (FLUIDS | SIZES, bench_fluid),
         (SOLIDS | COUPLED | (SOLID_SIZES if only else {}), bench_solid),
     )
-    for named, measure in works:
-        for name, work in named.items():
-            if only is None or only in name:
-                result[name] = measure(work(), communicator, threads, seconds)
+    chosen = [(name, work, measure) for named, measure in works for name, work in named.items()]
+    chosen = [each for each in chosen if only is None or only in each[0]]
+    before = communicator.broadcast(_read(_partial_file()) if only is None else None) or {}
+    done = {name: found for name, found in before.items() if before.items() >= result.items() and name not in result}
+    for number, (name, work, measure) in enumerate(chosen, 1):
+        if communicator.rank == 0:
+            state = "was measured before" if name in done else "..."
+            print(f"{number} of {len(chosen)}: {name} {state}", file=sys.stderr, flush=True)
+        result[name] = done[name] if name in done else measure(work(), communicator, threads, seconds)
+        if communicator.rank == 0 and only is None:
+            _write(_partial_file(), result)
     if communicator.rank == 0:
         print(json.dumps(result, indent=2), flush=True)
         if only is None:
-            _keep(result)
+            _partial_file().replace(_kept_file())
     return result
 
 
 def kept_bench() -> dict[str, Any] | None:
     """The last complete bench of this machine by this version, if there is one."""
+    return _read(_kept_file())
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """What a bench of this version left there, if one did."""
     try:
-        result = json.loads(_kept_file().read_text())
+        result: dict[str, Any] = json.loads(path.read_text())
     except (OSError, ValueError):
         return None
     return result if result.get("distfsi") == __version__ else None
 
 
-def _keep(result: dict[str, Any]) -> None:
-    _kept_file().parent.mkdir(parents=True, exist_ok=True)
-    temporary = _kept_file().with_suffix(".tmp")
+def _write(path: Path, result: dict[str, Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(".tmp")
     temporary.write_text(json.dumps(result))
-    os.replace(temporary, _kept_file())
+    os.replace(temporary, path)
+
+
+def _partial_file() -> Path:
+    """Where a bench that goes on keeps what it has measured."""
+    return _kept_file().with_suffix(".partial")
 
 
 def _kept_file() -> Path:

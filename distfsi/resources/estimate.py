@@ -152,7 +152,8 @@ class Resources:
     def output_times(self) -> int:
         """How many times fields are written."""
         every, end = self.scene.output.fields_every, end_time(self.scene, self.layout)
-        return 1 + (math.ceil(end / every - 1e-9) if every else 1)
+        times = end / every - 1e-9 if every else 1.0
+        return 1 + (math.ceil(times) if times < self.steps else self.steps)  # at most one per step
 
     def output_bytes(self) -> float:
         """Field files of one time."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+from distfsi.gauges import per_extent
 from distfsi.laws.registry import word_of
 from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
 from distfsi.scene.advice import advice, thickness
 from distfsi.scene.description import Body, Scene
+from distfsi.scene.placed_charges import Charge, charges, distances, gap_between
 
 
 def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, Any] | None = None) -> str:
@@ -32,10 +34,13 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
     for body in scene.solid.bodies if scene.solid else ():
         lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
+    for charge in charges(scene):
+        lines.append(_line("charge", _charge(charge, scene)))
+        lines += [_line("distance", text) for text in _distances(charge, scene)]
     lines += [
         _line("memory", _memory(resources)),
         _line("output", _output(resources)),
-        _line("steps", f"about {resources.steps:,}, if no wave becomes faster than the first ones"),
+        _line("steps", _steps(resources)),
         _line("time", _time(resources, threads, bench)),
     ]
     lines += [_line("note", text) for text in scene.notes]
@@ -44,6 +49,15 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
 
 def _line(name: str, text: str) -> str:
     return f"  {name:<11}{text}"
+
+
+def _steps(resources: Resources) -> str:
+    text = f"about {resources.steps:,}, if no wave becomes faster than the first ones"
+    solid = resources.scene.solid
+    velocities = {body.velocity for body in solid.bodies} if solid else set()
+    return text + (
+        " and bodies do not meet: the springs between them make steps shorter" if len(velocities) > 1 else ""
+    )
 
 
 def _blocks(resources: Resources) -> str:
@@ -65,6 +79,26 @@ def _body(body: Body, particles: int, scene: Scene) -> str:
         return text
     text += f", {thick:.4g} m thick: {thick / body.spacing:.3g} particles"
     return text + (f", {thick / min(scene.domain.spacing):.3g} cells" if scene.fluid else "")
+
+
+def _charge(charge: Charge, scene: Scene) -> str:
+    kg = per_extent("kg", scene.domain.dimensions + scene.domain.coordinates.turns)
+    text = f"{charge.name}: {charge.meant:.4g} {kg}, {charge.placed:.4g} {kg} as placed"
+    text += f" (one of {charge.copies} parts)" if charge.copies > 1 else ""
+    text += f", {charge.cells:.3g} cells per radius; the energy of {charge.tnt:.4g} {kg} of TNT"
+    near = [body.name for body in scene.solid.bodies if _touches(charge, body, scene)] if scene.solid else []
+    return text + "".join(f"; touches body '{name}'" for name in near)
+
+
+def _touches(charge: Charge, body: Body, scene: Scene) -> bool:
+    return gap_between(charge, body, scene.domain) < 0.5 * min(scene.domain.spacing)
+
+
+def _distances(charge: Charge, scene: Scene) -> Iterator[str]:
+    extents = scene.domain.dimensions + scene.domain.coordinates.turns
+    for name, length in distances(scene, charge):
+        scaled = f", Z = {charge.scaled(length):.3g} m/kg^(1/3)" if extents == 3 else ""
+        yield f"{name}: {length:.4g} m from the center of charge '{charge.name}'{scaled}"
 
 
 def _memory(resources: Resources) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
 from distfsi.scene.shapes import smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states
+from distfsi.scene.warnings import warnings
 
 AXES, ENDS = "xyz", ("low", "high")
 BEST_SPACING = 0.5  # of a fluid cell
@@ -26,6 +27,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     if layout:
         yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
+    yield from warnings(scene)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"

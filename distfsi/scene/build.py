@@ -92,6 +92,7 @@ def build_fluid(given: FluidInput, dimensions: int) -> Fluid:
         _detonation(given.detonation, phases) if given.detonation else None,
         Afterburn(_index(phases, given.afterburn.phase), given.afterburn.law.build()) if given.afterburn else None,
         _map(given.map, dimensions) if given.map else None,
+        given.hydrostatic_level,
     )
 
 
@@ -144,7 +145,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
     rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction)
-    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest)
+    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
 
 
 def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:

@@ -10,9 +10,10 @@ from collections.abc import Container, Iterator, Mapping
 import numpy as np
 
 from distfsi.gauges import Gauge
+from distfsi.laws.law import Source
 from distfsi.laws.registry import word_of
 from distfsi.narrowing import present
-from distfsi.scene.build import AXES, SIDES, stop_file_in
+from distfsi.scene.build import AXES, SIDES, build_sources, stop_file_in
 from distfsi.scene.cloud import Cloud
 from distfsi.scene.coordinate_checks import check_coordinates
 from distfsi.scene.description import (
@@ -47,6 +48,7 @@ from distfsi.scene.thermodynamics import sound_speed_squared
 COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would let the fluid through
 FILE_NAME = re.compile(r"[\w-]+")
 LONGEST_NAME = 255  # bytes of a file's name
+LONGEST_PATH = 2000  # of the output directory's
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -70,11 +72,15 @@ def check(
         return  # nothing can be placed in a domain that is wrong itself
     if fluid is not None and sections.fluid is not None:
         yield from check_inflow(sections.fluid, domain)
+        if (level := fluid.hydrostatic_level) is not None:
+            yield from check_rest(level, fluid, domain, build_sources(sections.domain.gravity, sections.sources))
     yield from check_output(sections.output, present, domain)
+    yield from check_directory(sections.output.directory or "")
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
         yield from check_obstacles(sections, solid, domain, "fluid" in present)
-        yield from check_solid(solid, domain)
+        ties = list(check_ties(solid))
+        yield from ties or check_solid(solid, domain)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
@@ -115,6 +121,25 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
     yield from check_reactions(given, fluid)
+
+
+def check_rest(level: float, fluid: Fluid, domain: Domain, sources: tuple[Source, ...]) -> Iterator[Fault]:
+    """A fluid is at rest under a force that acts along one axis and does not change."""
+    path = ("fluid", "hydrostatic_level")
+    forces = [sum(source.acceleration[axis] for source in sources) for axis in range(domain.dimensions)]
+    axes = [axis for axis, force in enumerate(forces) if force != 0.0]
+    if len(axes) != 1 or not all(source.steady for source in sources):
+        yield Fault(path, "needs gravity, steady and along one axis")
+        return
+    (axis,) = axes
+    if not domain.lower[axis] <= level <= domain.upper[axis]:
+        yield Fault(path, f"lies outside the domain along {AXES[axis]}")
+    if any(kind in ("periodic", "inflow") for kind in domain.boundaries[axis]):
+        yield Fault(
+            path, f"nothing is at rest between '{' and '.join(domain.boundaries[axis])}' ends along {AXES[axis]}"
+        )
+    if any(fluid.regions[0].state.velocity):
+        yield Fault(path, "the first region moves")
 
 
 def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -> Iterator[Fault]:
@@ -172,6 +197,19 @@ def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: 
         if body.motion and any(body.motion.angles) and bool(body.motion.axis) != (domain.dimensions == 3):
             text = "an axis is needed to turn in 3D" if domain.dimensions == 3 else "only in 3D there is an axis"
             yield Fault((*path, body.name, "motion"), text)
+
+
+def check_ties(solid: Solid) -> Iterator[Fault]:
+    """Ties name bodies that are there, of one form."""
+    bodies = {body.name: body for body in solid.bodies}
+    for n, names in enumerate(solid.tied):
+        path = ("solid", "tied", n)
+        if unknown := [name for name in names if name not in bodies]:
+            yield Fault(path, f"'{unknown[0]}' is no body" + one_of(bodies, unknown[0]))
+        elif len(set(names)) < 2:
+            yield Fault(path, "expected two bodies or more")
+        elif len({solid.form_of(bodies[name]) for name in names}) > 1:
+            yield Fault(path, "tied bodies need one form")
 
 
 def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
@@ -303,6 +341,12 @@ def check_output(given: OutputInput, present: Container[str], domain: Domain) ->
             yield Fault(("output", key), "needs a fluid")
     if given.schlieren and domain.dimensions == 1:
         yield Fault(("output", "schlieren"), "needs two or three dimensions")
+
+
+def check_directory(given: str) -> Iterator[Fault]:
+    """Its name is one that file systems take."""
+    if len(given.encode()) > LONGEST_PATH or any(len(part.encode()) > LONGEST_NAME for part in given.split("/")):
+        yield Fault(("output", "directory"), f"'{given[:40]}...' is too long for the name of a directory")
 
 
 def check_gauges(

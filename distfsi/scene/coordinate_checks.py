@@ -7,7 +7,7 @@ from pathlib import Path as File
 
 from distfsi.coordinates import Coordinates
 from distfsi.laws.registry import laws_of, word_of
-from distfsi.scene.description import Domain, Fluid, Map, Solid
+from distfsi.scene.description import Domain, Fluid, Scene, Solid
 from distfsi.scene.faults import Fault
 from distfsi.scene.schema import Sections
 
@@ -24,8 +24,8 @@ def check_coordinates(sections: Sections, domain: Domain, fluid: Fluid | None, s
         yield Fault(path, text)
         return
     yield from _check_axis(domain)
-    if fluid is not None and fluid.map is not None:
-        yield from _check_map(fluid.map, domain)
+    if fluid is not None and fluid.map is not None and coordinates.radial and fluid.map.center[0] != 0.0:
+        yield Fault(("fluid", "map", "center"), "lies beside the axis of this scene; expected r = 0")
     if not coordinates.radial:
         return
     if solid is not None:
@@ -60,14 +60,14 @@ def _check_axis(domain: Domain) -> Iterator[Fault]:
         yield Fault(("domain", "cells"), f"expected at least {FEWEST_CELLS} along r")
 
 
-def _check_map(given: Map, domain: Domain) -> Iterator[Fault]:
-    """The other run has left something, and its axis is that of this one."""
-    path = File(given.run)
+def check_map_is_there(scene: Scene) -> Iterator[Fault]:
+    """The run that a scene goes on from has left something."""
+    if scene.fluid is None or scene.fluid.map is None:
+        return
+    path = File(scene.fluid.map.run)
     if not path.is_file() and not any(path.glob("restart-[0-9]*.h5")):
         text = f"{path} is no restart file and has none; a finished run in radial coordinates leaves one"
         yield Fault(("fluid", "map", "run"), text)
-    if domain.coordinates.radial and given.center[0] != 0.0:
-        yield Fault(("fluid", "map", "center"), "lies beside the axis of this scene; expected r = 0")
 
 
 def _accelerations(sections: Sections) -> Iterator[tuple[tuple[str, ...], tuple[float, ...]]]:

@@ -201,7 +201,11 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`."""
+    """The compressible flow. One phase: Euler; two: `model`.
+
+    hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
+    regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
+    """
 
     phases: tuple[Phase, ...]
     regions: tuple[Region, ...]
@@ -215,6 +219,7 @@ class Fluid:
     detonation: Detonation | None = None
     afterburn: Afterburn | None = None
     map: Map | None = None
+    hydrostatic_level: float | None = None
 
 
 # ---- solid -----------------------------------------------------------------------------------------------------------
@@ -255,7 +260,7 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies.
+    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -268,10 +273,20 @@ class Solid:
     artificial_stress: float = 0.0
     obstacles: bool = False
     friction: float = 0.0
+    tied: tuple[tuple[str, ...], ...] = ()
 
     def form_of(self, body: Body) -> SolidForm:
         """The form of a body: its own or that of the solid."""
         return body.form or self.form
+
+    @property
+    def first_tied(self) -> tuple[int, ...]:
+        """For each body the number of the first one among those that it holds together with, through any of them."""
+        first, numbers = list(range(len(self.bodies))), {body.name: n for n, body in enumerate(self.bodies)}
+        for names in self.tied:
+            joined = {first[numbers[name]] for name in names}
+            first = [min(joined) if n in joined else n for n in first]
+        return tuple(first)
 
 
 # ---- the whole -------------------------------------------------------------------------------------------------------
@@ -364,7 +379,7 @@ class Performance:
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
 
     title: str
     domain: Domain
@@ -377,3 +392,4 @@ class Scene:
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    stages: tuple[Scene, ...] = ()

@@ -63,6 +63,8 @@ def _describe(error: dict[str, Any], path: Path, data: Json, schema: Json) -> Fa
             return Fault(path + tuple(_quoted(context["discriminator"])), "is missing" + one_of(words, ""))
         case "model_attributes_type" | "model_type" | "dict_type":
             return Fault(path, f"{given}; expected a table")
+        case "too_long":
+            return Fault(path, f"has {len(value)} entries; at most {context['max_length']}")
         case "tuple_type":
             return Fault(path, f"{given}; expected a list")
         case "value_error":

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 Path = tuple[str | int, ...]
 
+LONGEST_WORD = 100  # of which something near is sought
+
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]]+)\]\]?\s*(?:#.*)?")
 _KEY = re.compile(r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""")
 _PART = re.compile(r"""[\w-]+|"[^"]*"|'[^']*'""")
@@ -22,8 +24,13 @@ class Fault(NamedTuple):
 
 
 def nearest(word: Any, words: Iterable[str]) -> str | None:
-    """The one of `words` that resembles `word` most, if any does."""
-    return next(iter(difflib.get_close_matches(str(word), list(words), n=1)), None)
+    """The one of `words` that resembles `word` most, if any does, whatever is written in capitals."""
+    known = list(words)
+    lowered = {each.lower(): each for each in known}
+    found = difflib.get_close_matches(str(word)[:LONGEST_WORD], known, n=1)
+    if not found:
+        found = [lowered[near] for near in difflib.get_close_matches(str(word)[:LONGEST_WORD].lower(), lowered, n=1)]
+    return next(iter(found), None)
 
 
 def one_of(words: Iterable[str], given: Any) -> str:

@@ -14,12 +14,18 @@ from pydantic import ValidationError
 from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
+from distfsi.scene.coordinate_checks import check_map_is_there
 from distfsi.scene.description import Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
-from distfsi.scene.overrides import apply
+from distfsi.scene.overrides import TABLES, apply
 from distfsi.scene.schema import Input, Sections, context_of
+from distfsi.scene.stages import path_in_stage, stage_inputs
+
+LARGEST_FILE = 64_000_000  # bytes of an input
+FAULT_LIMIT = 100  # that are told at once
+LONGEST_NAME = 100  # letters of a phase, a body, a gauge, a source
 
 
 def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
@@ -32,14 +38,31 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
+    inputs = stage_inputs(data, file.stem)
     unnamed, incomplete = materials.fill(data)
-    sections, invalid = validate(data, str(file.parent))
-    scene, crossed = _assemble(sections, data, file.stem)
-    faults += uncharged + unnamed + [fault for fault in invalid + crossed if not _inside(fault.path, incomplete)]
+    scene, found = _checked(data, file)
+    stages: list[Scene] = []
+    for number, given in enumerate(inputs):
+        _, unknown = materials.fill(given)  # whose faults are those of the scene
+        stage, more = _checked(given, file)
+        more = [fault for fault in more if not _inside(fault.path, unknown)]
+        found += [Fault(path_in_stage(number, fault.path), fault.text) for fault in more]
+        stages += [stage] if stage else []
+    if scene is not None and not inputs:  # they will have run
+        found += check_map_is_there(scene)
+    faults += uncharged + unnamed + [fault for fault in found if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:
         raise InputError(locations.tell(faults))
-    return replace(scene, notes=tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)])))
+    noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
+    return replace(scene, notes=noted, stages=tuple(stages))
+
+
+def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
+    """The scene of `data`, without its stages, and all faults."""
+    sections, invalid = validate(data, str(file.parent))
+    scene, crossed = _assemble(sections, data, file.stem)
+    return scene, invalid + crossed
 
 
 @cache
@@ -64,15 +87,27 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
 
 
 def _read(file: File) -> tuple[str, dict[str, Any]]:
+    """Text and tables of a file. A mark of the byte order at its beginning, as some editors leave it, is no text."""
     try:
-        text = file.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
+        with file.open("rb") as opened:
+            content = opened.read(LARGEST_FILE + 1)
     except OSError as error:
         raise InputError([f"{file}: cannot be read: {error.strerror}"]) from error
+    except ValueError as error:  # NUL in the name
+        raise InputError([f"{str(file)!r}: is no name of a file"]) from error
+    if len(content) > LARGEST_FILE:
+        raise InputError([f"{file}: is larger than {LARGEST_FILE / 1e6:.0f} MB"])
+    try:
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise InputError([f"{file}: is no UTF-8 text"]) from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError([f"{file}: is no TOML: {error}"]) from error
+    try:
+        return text, tomllib.loads(text)
+    except ValueError as error:  # of tomllib, or of a number of thousands of digits
+        cause = error if isinstance(error, tomllib.TOMLDecodeError) else "a number has too many digits"
+        raise InputError([f"{file}: is no TOML: {cause}"]) from error
+    except RecursionError as error:
+        raise InputError([f"{file}: is no TOML: brackets in too many brackets"]) from error
 
 
 def _inside(path: Path, tables: Sequence[Path]) -> bool:
@@ -80,15 +115,35 @@ def _inside(path: Path, tables: Sequence[Path]) -> bool:
 
 
 def validate(data: dict[str, Any], folder: str) -> tuple[Sections, list[Fault]]:
-    """The sections of `data` that are valid in themselves, and the faults of the others. Names of files that `data`
-    holds count from `folder`."""
+    """The sections of `data` that are valid in themselves, and the faults of the others, but not more than FAULT_LIMIT
+    of them. Names of files that `data` holds count from `folder`."""
+    if unreadable := list(find_unreadable(data)):
+        return Sections(), unreadable[:FAULT_LIMIT]
     context = context_of(data, folder)
     try:
         return Input.model_validate(data, context=context), []
     except ValidationError as error:
-        errors = error.errors()
+        errors = error.errors(include_url=False)
     sound = {key: value for key, value in data.items() if key not in {error["loc"][0] for error in errors}}
-    return Sections.model_validate(sound, context=context), diagnose(errors, data, schema())
+    faults = diagnose(errors[:FAULT_LIMIT], data, schema())
+    if len(errors) > FAULT_LIMIT:
+        faults.append(Fault((), f"and {len(errors) - FAULT_LIMIT} more faults"))
+    return Sections.model_validate(sound, context=context), faults
+
+
+def find_unreadable(data: Any, path: Path = ()) -> Iterator[Fault]:
+    """Faults of texts and names that no file can hold."""
+    entries = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in entries:
+        name = str(key)
+        if "\0" in name:
+            yield Fault(path, f"{name[:LONGEST_NAME]!r}; a name has no character NUL")
+        elif path in TABLES and len(name) > LONGEST_NAME:
+            yield Fault(path, f"'{name[:20]}...' has {len(name)} letters; a name has at most {LONGEST_NAME}")
+        elif isinstance(value, str) and "\0" in value:
+            yield Fault((*path, key), f"{value[:LONGEST_NAME]!r}; a text has no character NUL")
+        else:
+            yield from find_unreadable(value, (*path, key))
 
 
 def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scene | None, list[Fault]]:

@@ -69,6 +69,7 @@ SECTIONS = {
     "`[gauges.NAME]`": _names(Gauge),
     "`[coupling]`": ("CouplingInput",),
     "`[performance]`": ("PerformanceInput",),
+    "`[[stages]]`": ("StageInput",),
 }
 TABLE_HEAD = ["| key | value | default | meaning |", "|---|---|---|---|"]
 LIMITS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}

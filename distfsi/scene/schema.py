@@ -139,6 +139,11 @@ class FluidInput(Table):
         min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
+    hydrostatic_level: quantity("m") | None = Field(
+        None,
+        description="coordinate along gravity where the pressure of the first region holds: regions with that pressure "
+        "then are at rest, their pressures growing along gravity, their densities along isentropes; default: as given",
+    )
     map: MapInput | None = Field(None, description="`[fluid.map]`: goes on from another run")
     inflow: InflowInput = Field(InflowInput(), description="`[fluid.inflow.x_low]` and so on")
     reconstruction: description.Reconstruction = Field(
@@ -241,6 +246,9 @@ class SolidInput(Table):
 
     bodies: dict[str, BodyInput] = Field({}, description="`[solid.bodies.NAME]`: the bodies")
     obstacles: dict[str, ObstacleInput] = Field({}, description="`[solid.obstacles.NAME]`: rigid parts")
+    tied: tuple[tuple[str, ...], ...] = Field(
+        (), description="lists of names of bodies that hold together where they touch, by bonds or as one material"
+    )
     form: description.SolidForm = Field(
         "total_lagrangian",
         description="particles hold on to the neighbours they start with, by bonds that damage cuts, or act on those "
@@ -343,6 +351,19 @@ class PerformanceInput(Table):
     )
 
 
+class StageInput(Table):
+    """A run in radial coordinates that comes before the scene's own, which goes on from it, as `[fluid.map]` says. Its
+    results go to a directory of its own. It has the phases, the method and the times of the scene but for what stands
+    here."""
+
+    domain: dict[str, Any] = Field(description="as `[domain]`: another one")
+    regions: tuple[dict[str, Any], ...] = Field((), description="as `[[fluid.regions]]`: those of this domain")
+    time: dict[str, Any] = Field({}, description="as `[time]`: what is another, `end` as a rule")
+    detonators: tuple[dict[str, Any], ...] = Field((), description="as those of `[fluid.detonation]`, in this domain")
+    map: dict[str, Any] = Field({}, description="as `[fluid.map]` without `run`, of a stage after the first")
+    gauges: dict[str, Any] = Field({}, description="as `[gauges.NAME]`: those of this stage")
+
+
 class Sections(Table):
     """The sections of an input, any of which may be absent."""
 
@@ -357,6 +378,7 @@ class Sections(Table):
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     coupling: CouplingInput = CouplingInput()
     performance: PerformanceInput = PerformanceInput()
+    stages: tuple[StageInput, ...] = Field((), description="`[[stages]]`: runs before this one, one after the other")
 
 
 class Input(Sections):

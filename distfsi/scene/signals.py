@@ -14,6 +14,7 @@ from distfsi.narrowing import present
 from distfsi.scene.description import Body, Domain, Fluid, FluidState, Scene, Shape
 from distfsi.scene.fractions import cell_fractions
 from distfsi.scene.shapes import contains, distance
+from distfsi.scene.thermodynamics import solid_sound
 from distfsi.scene.waves import Side, Wave, meet
 
 SAMPLES = {1: 4096, 2: 512, 3: 96}  # points along an axis at which a scene is looked at, at most
@@ -203,12 +204,6 @@ def fluid_rate(scene: Scene, layout: Layout) -> float:
 
 def _inverse_sum(domain: Domain) -> float:
     return sum(1.0 / h for h in domain.spacing)
-
-
-def solid_sound(body: Body) -> float:
-    """Longitudinal sound speed [m/s] of a body at rest."""
-    bulk = body.eos.rest_bulk_modulus(body.density)
-    return math.sqrt((bulk + 4.0 / 3.0 * body.strength.shear_modulus) / body.density)
 
 
 def solid_rate(scene: Scene, body: Body) -> float:

@@ -1,10 +1,12 @@
-"""Equations of state as a scene needs them before a run, from the laws' own formulas. What no law covers is NaN."""
+"""Equations of state as a scene needs them before a run, from the laws' own formulas; the sound of solids. What no law
+covers is NaN."""
 
 from __future__ import annotations
 
-from math import nan
+from math import nan, sqrt
 
 from distfsi.laws.law import FluidEos
+from distfsi.scene.description import Body
 
 
 def pressure(eos: FluidEos, density: float, energy: float) -> float:
@@ -30,3 +32,9 @@ def sound_speed_squared(eos: FluidEos, density: float, pressure: float) -> float
     (omega, omega_slope), (reference, slope) = eos.grueneisen(density), eos.reference(density)
     weight = 1.0 + density * omega_slope / omega
     return slope + (weight * (pressure - reference) + omega * pressure) / density
+
+
+def solid_sound(body: Body) -> float:
+    """Longitudinal sound speed [m/s] of a body at rest."""
+    bulk = body.eos.rest_bulk_modulus(body.density)
+    return sqrt((bulk + 4.0 / 3.0 * body.strength.shear_modulus) / body.density)

@@ -37,6 +37,7 @@ PLAIN: dict[str, tuple[str | float, Dimension]] = {
     "in": ("0.0254", LENGTH),
     "ft": ("0.3048", LENGTH),
     "l": ("1e-3", (3, 0, 0, 0)),
+    "cc": ("1e-6", (3, 0, 0, 0)),
     "min": ("60", TIME),
     "h": ("3600", TIME),
     "atm": ("101325", PRESSURE),
@@ -51,6 +52,8 @@ UNITS: dict[str, Unit] = {
     for name, (scale, dimension) in PREFIXED.items()
     for prefix, exponent in PREFIXES.items()
 } | {name: (Fraction(scale), dimension) for name, (scale, dimension) in PLAIN.items()}
+
+LONGEST = 400  # letters of a value
 
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*(.*?)\s*")
 _TOKEN = re.compile(
@@ -141,7 +144,7 @@ def _number_to_float(value: object, unit: str) -> float:
 
 def _text_to_si(text: str, unit: str) -> float:
     example = "a number" if unit == "1" else f'a number or a text such as "2.5 {unit}"'
-    match = _VALUE.fullmatch(text)
+    match = _VALUE.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise ValueError(f"is not understood; expected {example}")
     number, given = match.groups()

@@ -13,6 +13,8 @@ from pydantic_core import PydanticCustomError
 
 from distfsi.scene.units import to_si
 
+LARGEST_COUNT = 10**15  # floats count as far
+
 
 class Table(BaseModel):
     """A TOML table; unknown keys are faults."""
@@ -57,9 +59,9 @@ def vector(unit: str) -> Any:
 
 def counts(minimum: int) -> Any:
     """Type of a list of one to three whole numbers from `minimum` on; in 1D also a single number."""
-    number = Annotated[int, Field(strict=True, ge=minimum)]
+    number = Annotated[int, Field(strict=True, ge=minimum, le=LARGEST_COUNT)]
     as_list = BeforeValidator(lambda value: value if isinstance(value, list) else [value])
-    shown = {"type": ["array", "integer"], "items": {"type": "integer", "minimum": minimum}}
+    shown = {"type": ["array", "integer"], "items": {"type": "integer", "minimum": minimum, "maximum": LARGEST_COUNT}}
     return Annotated[tuple[number, ...], Field(min_length=1, max_length=3), as_list, WithJsonSchema(shown)]
 
 
@@ -86,4 +88,4 @@ Velocity = vector("m/s")
 Acceleration = vector("m/s2")
 Direction = vector("1")
 PhaseName = Annotated[str, BeforeValidator(_phase_name)]
-Count = Annotated[int, Field(strict=True, ge=1)]
+Count = Annotated[int, Field(strict=True, ge=1, le=LARGEST_COUNT)]

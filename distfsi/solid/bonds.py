@@ -56,7 +56,8 @@ class BondNetwork:
         self._search, self._communicator, self._sides = search, communicator, sides
         self._dimensions = exchange.blocks.grid.dimensions
         self.support = 2.0 * scene.smoothing * spacing.max()
-        self.bodies = Bodies(device.array(spacing), device.array(scene.smoothing * spacing))
+        self._smoothing, self._first = scene.smoothing * spacing, np.array(scene.first_tied)
+        self.bodies = Bodies(device.array(spacing), device.array(self._smoothing))
         self._ids: np.ndarray | None = None  # for whose columns the requested keys are
         self._requested = np.empty(0, dtype=np.int64)
         self._key: Key | None = None  # for whose particles the partners and the geometry are
@@ -66,14 +67,15 @@ class BondNetwork:
     # ---- making bonds ------------------------------------------------------------------------------------------------
 
     def make(self, c: Columns, exchange: ParticleExchange) -> None:
-        """Collective. Bond each particle with its neighbours of its body, where they are now, and add the columns."""
+        """Collective. Bond each particle with its neighbours of its body and those tied to it, where they are now, and
+        add the columns."""
         plan, side, table, count = self._neighbours(c, exchange)
         key, bonds = plan.key.host, []
         for begin, near in chunks_of(table):
             rows = slice(begin, begin + len(near))
             found = np.arange(table.shape[1]) < count[rows, None]
             near, body = np.where(found, near, 0), c["body"][rows, None].astype(np.int64)
-            bonded = found & (side[near] == body) & self._bonded[body]
+            bonded = found & (side[near] == self._first[body]) & self._bonded[body]
             keys = np.sort(np.where(bonded, key[near], NONE), axis=1)
             bonds.append(keys[:, : bonded.sum(axis=1).max(initial=1)])
         width = int(self._communicator.maximum(np.array([max((b.shape[1] for b in bonds), default=1)]))[0])
@@ -113,7 +115,7 @@ class BondNetwork:
         `reference` (count, D) [m]; `payload` (count, ...) with the volume in the first column. Raises Diverged when a
         partner is not among them.
         """
-        count, body = c.read("bond_count", "body")
+        (count,) = c.read("bond_count")
         if key is not self._key:
             self._key, self._partner = key, self._rows_of_partners(c, key.host)
             n, width = self._partner.shape
@@ -121,7 +123,8 @@ class BondNetwork:
                 raise Diverged("solid: the partner of a bond is not at hand")
             self._geometry = self._device.empty((n, width * (self._dimensions + 1)))
             bonds = Bonds(count, self._partner, self._geometry)
-            self._device.run(self._kernels.weigh_bonds, n, reference, payload, self.bodies, body, bonds)
+            smoothing = self._device.array(self._smoothing[self._sides.body_of(key.host)])
+            self._device.run(self._kernels.weigh_bonds, n, reference, payload, smoothing, bonds)
         return Bonds(count, self._partner, self._geometry)
 
     def _rows_of_partners(self, c: Columns, key: np.ndarray) -> Any:

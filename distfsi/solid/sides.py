@@ -15,9 +15,10 @@ ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symme
 
 
 class Sides:
-    """A body is a side, and its mirror image is another one behind a symmetry plane that it does not go through.
+    """A body is a side, with all that are tied to it, and its mirror image is another one behind a symmetry plane that
+    it does not go through.
 
-    bodies  how many there are: a side is the number of its body, for an image behind such a plane that number more
+    bodies  how many there are: a side is the number of its first body, for an image behind such a plane so many more
     meet    whether there are different sides
     """
 
@@ -33,7 +34,8 @@ class Sides:
             touching[c["body"][close], axis] = 1.0
         touching = communicator.maximum(touching.ravel()).reshape(touching.shape)
         self._continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
-        self.meet = bool(self.bodies > 1 or any(not touching[:, axis].all() for axis, _ in planes))
+        self._first = np.array(scene.first_tied)
+        self.meet = bool(self._first.any() or any(not touching[:, axis].all() for axis, _ in planes))
         self._device = exchange.device
         self._key: Key | None = None
         self._side: DualArray | None = None
@@ -41,7 +43,11 @@ class Sides:
     def of(self, key: Key) -> DualArray:
         """The side (count,) of particles, ghosts and images with these keys."""
         if key is not self._key:
-            body = np.searchsorted(self._end, key.host // IMAGES, side="right")
+            body = self.body_of(key.host)
             beyond = key.host % IMAGES & ~self._continued[body] > 0
-            self._key, self._side = key, DualArray(self._device, body + self.bodies * beyond)
+            self._key, self._side = key, DualArray(self._device, self._first[body] + self.bodies * beyond)
         return present(self._side)
+
+    def body_of(self, key: np.ndarray) -> np.ndarray:
+        """The body (n,) of the particles and images with the keys (n,)."""
+        return np.searchsorted(self._end, key // IMAGES, side="right")

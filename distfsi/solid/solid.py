@@ -296,13 +296,15 @@ class Solid:
             raise Diverged(f"{self._name(broken[0])} has no valid state at t = {time:.6g} s: {state}")
 
     def totals(self) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks."""
+        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks;
+        acoustic [N s]: their momentum at the speed of sound."""
         c = self.columns
         mass, velocity = c["mass"], c["velocity"]
         kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
-        values = np.column_stack([mass, kinetic, mass * c["energy"], mass[:, None] * velocity])
+        sums = (mass, kinetic, mass * c["energy"], mass * c["sound_speed"])
+        values = np.column_stack([*sums, mass[:, None] * velocity])
         total = self.blocks.sum(self._per_body(self.device.array(values)).sum(axis=1))
-        return {"mass": total[0], "kinetic": total[1], "internal": total[2], "momentum": total[3:]}
+        return dict(zip(("mass", "kinetic", "internal", "acoustic"), total, strict=False)) | {"momentum": total[4:]}
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
         """Collective. mass [kg], center of mass (D,) [m], momentum (D,) [N s] of a body, and the impulse (D,) [N s]

@@ -143,7 +143,7 @@ def expand(communicator: Communicator, name: str, overrides: Sequence[str]) -> E
     if communicator.rank > 0:
         return None
     history = read_history(directory / "history.csv")
-    time, kinetic = (np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J]"))
+    time, kinetic = (np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J/m]"))
     return Expansion(walls(directory), time, kinetic)
 
 

@@ -178,7 +178,7 @@ def energies(directory: Path) -> Chart:
     """Energy of the quarter of the tube (after the paper's Fig. 27)."""
     history = read_history(directory / "history.csv")
     time, kinetic, internal = (
-        np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J]", "solid internal energy [J]")
+        np.asarray(history[name]) for name in ("time [s]", "solid kinetic energy [J/m]", "solid internal energy [J/m]")
     )
     curves = [
         Curve(1e6 * time, 1e-6 * values, name)

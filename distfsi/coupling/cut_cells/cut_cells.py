@@ -61,13 +61,14 @@ class CutCells:
 
     reach   [m]: how far the solid's ghosts must go for its own sake: not at all
     sub_steps, stray  the most sub-steps of the solid in a step, and how far its particles may go in them [m]
-    causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives; bodies that touch
-            an end of the domain push against it), "sides" (what the fluid counts as having left the domain beside
-            them, and has not)
+    causes  of what the coupling creates: "wall" (what the solid receives less what the fluid gives); or of what passes
+            the ends of the domain with bodies: "ends" (the same while bodies touch an end, which gives the rest),
+            "sides" (what the fluid counts as having left beside them, and has not)
     geometry  of the last step; None before the first. That of a wall that stands is found once
     """
 
-    causes = ("wall", "sides")
+    causes = ("wall", "ends", "sides")
+    at_ends = ("ends", "sides")
     reach = 0.0
 
     def __init__(
@@ -79,11 +80,11 @@ class CutCells:
         self._staircase = scene.coupling.scheme == "staircase"
         self._particles = SolidParticles(solid)
         self._cell_volume = float(np.prod(grid.spacing))
-        self._initial = InitialState(present(scene.fluid), model)
+        self._initial = InitialState(present(scene.fluid), model, grid)
         self._rest = self._state_at_rest(scene)
         self.geometry: CutGeometry | None = None
         self._settled = False
-        self._wall_sums = np.zeros((blocks.local_count, model.conserved))
+        self._wall_sums, self._end_sums = np.zeros((2, blocks.local_count, model.conserved))
         # the kernels, and who uses them
         coarsest = max(body.spacing for body in present(scene.solid).bodies)
         self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
@@ -161,7 +162,8 @@ class CutCells:
         rows = self._lone.rows()
         # cells
         motion = self._wall_particles.cut(passage, start, self._particles.carried)
-        lists, walls, expands = self._merge_cells(rows.shape[0] > 0)
+        touched = self._rows.largest(motion.image.reshape(-1), 0.0)
+        lists, walls, expands, at_end = self._merge_cells(rows.shape[0] > 0, touched > 0.0)
         merging, above = self._merging.merging_of(lists.band)
         # faces
         band, faces = self._fluxes.find_faces(lists.band, above, walls)
@@ -169,24 +171,25 @@ class CutCells:
         ends = self._merging.rows_in_band(self._sides.cells)
         start_volume = self.device.empty(lists.band.shape[0])
         self.geometry = CutGeometry(
-            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands
+            motion, rows, walls, lists, band, merging, faces, ends, walled, loads, start_volume, expands, at_end
         )
         self._settled = self.solid.stands and self._redistribution.is_settled(lists, rows, walls)
         return self.geometry
 
-    def _merge_cells(self, lone: bool) -> tuple[CellLists, Walls, bool]:
+    def _merge_cells(self, lone: bool, touched: bool) -> tuple[CellLists, Walls, bool, bool]:
         """Collective. Find merge targets, and let isolated cells hand their fluid to receivers; the lists of cells, and
-        whether any rank has `lone` particles whose cells expand."""
+        whether any rank has `lone` particles whose cells expand, and whether on any an end of the domain is `touched`
+        by bodies."""
         walls = self._walls
         self._merging.find_targets(walls, self.fluid_volume.device)
         lists = self._merging.list_cells(walls, self.fluid_volume.device)
         states = self._redistribution.states(self.fluid.device_state)
         self._redistribution.take_contents(lists.band, states)
-        found = np.array([float(self._redistribution.any_absorbed(lists.band, walls.kind)), float(lone)])
-        absorbed, alone = self.blocks.communicator.maximum(found)
+        found = (self._redistribution.any_absorbed(lists.band, walls.kind), lone, touched)
+        absorbed, alone, at_end = self.blocks.communicator.maximum(np.array(found, dtype=float))
         if absorbed > 0.0:
             lists = self.absorb(lists, walls)
-        return lists, walls, bool(alone > 0.0) and not self._staircase
+        return lists, walls, bool(alone > 0.0) and not self._staircase, bool(at_end > 0.0)
 
     def absorb(self, lists: CellLists, walls: Walls) -> CellLists:
         """Collective. Contents of isolated cells move to their receivers, and these cells are covered: the new
@@ -247,8 +250,9 @@ class CutCells:
         D, P, p = self._dimensions, self.model.phases, self._particles
         states = None if self.solid.stands else self._redistribution.states(self.fluid.device_state)
         impulse, work = self._forces.correct(geometry, excess, transfer.shared, states)
-        self._wall_sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
-        self._wall_sums[:, -1] += p.work - work - transfer.dragged[:, -1]
+        sums = self._end_sums if geometry.at_end else self._wall_sums
+        sums[:, P : P + D] += p.impulse - impulse - transfer.dragged[:, :-1]
+        sums[:, -1] += p.work - work - transfer.dragged[:, -1]
 
     # ---- between steps ----------------------------------------------------------------------------------------------
 
@@ -325,7 +329,7 @@ class CutCells:
         """What a restart needs: the volumes, and the budget."""
         return {
             "cells": {"fluid_volume": self.blocks.without_ghosts(self.fluid_volume.host()[:, :1])},
-            "sums": {"wall": self._wall_sums, "sides": self._sides.passed.host()},
+            "sums": {"wall": self._wall_sums, "ends": self._end_sums, "sides": self._sides.passed.host()},
             "values": {"drift": np.array(self._wall_particles.thin.drift)},
         }
 
@@ -336,7 +340,7 @@ class CutCells:
         self._classify()
         self._fill_volume_ghosts()
         self._wall_particles.thin.drift = float(snapshot["values"]["drift"])
-        self._wall_sums[:] = snapshot["sums"]["wall"]
+        self._wall_sums[:], self._end_sums[:] = (snapshot["sums"][name] for name in ("wall", "ends"))
         self._sides.restore(snapshot["sums"]["sides"])
         self.wall.near.host()[:] = 1
         self.wall.near.changed()
@@ -345,6 +349,6 @@ class CutCells:
         self._settled = False
 
     def budget_by_cause(self) -> dict[str, np.ndarray]:
-        """Collective. Masses, momentum and energy (conserved,) that the coupling has created so far, per cause."""
-        totals = self.blocks.sum(np.hstack([self._wall_sums, self._sides.sums()]))
+        """Collective. Masses, momentum and energy (conserved,) that there are more since the start, per cause."""
+        totals = self.blocks.sum(np.hstack([self._wall_sums, self._end_sums, self._sides.sums()]))
         return dict(zip(self.causes, np.split(totals, len(self.causes)), strict=True))

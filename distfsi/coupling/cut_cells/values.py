@@ -105,6 +105,7 @@ class CutGeometry:
     walled    (k,) indices in the band of the cells that the wall passes through
     loads     how the wall moves, and what the fluid gives to it: the stages add to that
     start_volume  (n,) fluid volume fractions of the band's cells before the first stage, which leaves them here
+    at_end    whether bodies touch an end of the domain
     expands   whether whole cells fill what is missing in them: where lone particles have left a wall
     """
 
@@ -120,6 +121,7 @@ class CutGeometry:
     loads: WallLoads
     start_volume: Any
     expands: bool
+    at_end: bool
 
     def again(self, device: Device) -> CutGeometry:
         """That of the next step where the wall stands: what the fluid gives to it begins anew."""

@@ -97,6 +97,7 @@ class ImmersedBoundary:
     """
 
     causes = ("wall", "covered", "fresh", "sides")
+    at_ends = ("sides",)
     sub_steps, stray = 1, 0.0
 
     def __init__(
@@ -138,7 +139,7 @@ class ImmersedBoundary:
     def _state_at_rest(self, scene: Scene) -> np.ndarray:
         """Primitive state (variables,) of the first region without its velocity."""
         fluid = present(scene.fluid)
-        state = InitialState(fluid, self.model).of(fluid.regions[0].state)
+        state = InitialState(fluid, self.model, self.blocks.grid).of(fluid.regions[0].state)
         rest = np.array(self.model.formula("primitives")(state), dtype=self._real)
         rest[self.model.phases : self.model.phases + self._dimensions] = 0.0
         return rest

@@ -28,12 +28,14 @@ from distfsi.formulas.symbols import (
     FLUXES,
     FRACTIONAL,
     GHOSTS,
+    HYDROSTATIC,
     PHASES,
     RADIAL,
     SHARPENED,
     TRANSVERSE_SENSOR,
     VARIABLES,
     before_relaxation,
+    beyond_rest,
     face_flux,
     fraction_after,
     halved_range,
@@ -66,23 +68,52 @@ def primitives_row(U, P, u, su, p, sp, n):
 
 
 @helper
-def low_increment(v):
-    """Row of T with the increment of variable v from a cell's low face to its mean; that to its high face is row v."""
+def low_increment(v, axis):
+    """Row of T with the increment of variable v from a cell's low face to its mean; that to its high face is row v. In
+    radial coordinates they differ along r alone."""
+    if RADIAL:
+        return v + (VARIABLES if axis == 0 else 0)
     return v + VARIABLES if ASYMMETRIC else v
 
 
+@helper
+def density_at(P, c, sp):
+    """[kg/m3] of the cell P[c]; variables are sp apart."""
+    if PHASES == 1:
+        return load(P, c)
+    else:
+        a1 = load(P, c + (PHASES + DIMENSIONS + 1) * sp)
+        return a1 * load(P, c) + (1.0 - a1) * load(P, c + sp)
+
+
+@helper
+def pressure_increments(P, c, sp, step, fall):
+    """Increments of the pressure in a cell whose first variable is at P[c]: beside the weight of fluid at rest, with
+    g h along the row, and that weight."""
+    pressure = (PHASES + DIMENSIONS) * sp
+    p = tuple(load(P, c + pressure + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
+    rho = tuple(density_at(P, c + k * step, sp) for k in static_range(1 - GHOSTS, GHOSTS))
+    low, high = reconstructed(beyond_rest(p, rho, fall))
+    weight = 0.5 * fall * rho[GHOSTS - 1]
+    return (low + weight, high + weight)
+
+
 @row
-def increments_row(P, T, p, sp, step, t, st, n):
+def increments_row(P, T, p, sp, step, t, st, n, fall):
     """T[t …] = increments of the primitives of the n cells at P[p …] from the mean to the high face along the axis
-    whose cells are `step` apart, then where they differ those from the low face to the mean."""
+    whose cells are `step` apart, then where they differ those from the low face to the mean; `fall`: g h of a body
+    force along that axis, if there is one."""
     for v in static_range(VARIABLES):
         for i in range(n):
             c = p + v * sp + i
             cells = tuple(load(P, c + k * step) for k in static_range(1 - GHOSTS, GHOSTS))
-            low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
+            if HYDROSTATIC and v == PHASES + DIMENSIONS:
+                low, high = pressure_increments(P, p + i, sp, step, fall)
+            else:
+                low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
             store(T, t + v * st + i, high)
-            if ASYMMETRIC:
-                store(T, t + low_increment(v) * st + i, low)
+            if ASYMMETRIC and not RADIAL:
+                store(T, t + low_increment(v, 0) * st + i, low)
 
 
 @row
@@ -97,7 +128,7 @@ def increments_in_r_row(P, T, p, sp, t, st, n):
             along = reconstructed_in_r(cells, backward, forward, load(P, to_low + i))
             low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else along
             store(T, t + v * st + i, high)
-            store(T, t + low_increment(v) * st + i, low)
+            store(T, t + low_increment(v, 0) * st + i, low)
 
 
 # ---- the transverse pressure sensor ----------------------------------------------------------------------------------
@@ -158,7 +189,7 @@ def flux_row(P, T, F, faces: Faces, n):
             low[v] + load(T, faces.low + variable_at(v, faces.axis) * faces.rows + i) for v in static_range(VARIABLES)
         )
         right = tuple(
-            high[v] - load(T, faces.high + low_increment(variable_at(v, faces.axis)) * faces.rows + i)
+            high[v] - load(T, faces.high + low_increment(variable_at(v, faces.axis), faces.axis) * faces.rows + i)
             for v in static_range(VARIABLES)
         )
         # the flux
@@ -167,7 +198,7 @@ def flux_row(P, T, F, faces: Faces, n):
             store(F, faces.flux + v * faces.rows + i, flux[v])
         # the limiter's indicator
         c = min(sound_speed(left), sound_speed(right))
-        if ASYMMETRIC:  # then a cell's mean may have a much lower one
+        if ASYMMETRIC and not RADIAL:  # then a cell's mean may have a much lower one
             c = min(c, min(sound_speed(low), sound_speed(high)))
         indicator = limiter_indicator(low, high, flux, c, rate_of_face(P, i, faces))
         store(F, faces.flux + FLUXES * faces.rows + i, indicator)

@@ -97,35 +97,61 @@ template <int SIDE> DEVICE real face_size(Metrics metrics, int nx, int i)
     return metrics(VOLUME, i);
 }
 
-// Increments of a variable from the low face of a cell to its mean and from there to its high face.
-template <int AXIS> DEVICE auto increments(const auto &numbers, const real *W, Metrics metrics, bool sharp, int i, int j, int k)
+DEVICE real density_at(const real *P, int c)
 {
+    if (PHASES == 1) return P[c];
+    const real a1 = P[(PHASES + DIMENSIONS + 1) * SP + c];
+    return a1 * P[c] + (1 - a1) * P[SP + c];
+}
+
+// fall[d] = g h of the body force along each axis.
+DEVICE void find_falls(const auto &numbers, real dt, real x, real y, real z, real *fall)
+{
+    if constexpr (HYDROSTATIC) set(falls(numbers, dt, x, y, z), fall, 1);
+}
+
+// Increments of a variable from the low face of a cell to its mean and from there to its high face; `fall`: of find_falls.
+template <int AXIS> DEVICE auto increments(const auto &numbers, const real *P, Metrics metrics, int variable, real fall, int i, int j, int k)
+{
+    const bool sharp = variable == PHASES + DIMENSIONS + 1;
     real values[2 * GHOSTS - 1];
 #pragma unroll
-    for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = W[cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
+    for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = P[variable * SP + cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
     const auto cells = tuple_of<2 * GHOSTS - 1>(values);
     if constexpr (RADIAL && AXIS == 0) {
         const auto along = reconstructed_in_r(numbers, cells, metrics(NEARNESS, i), metrics(NEARNESS, i + 1), metrics(TO_LOW, i));
         return SHARPENED && sharp ? sharpened(numbers, cells) : along;
-    } else
+    } else {
+        if constexpr (HYDROSTATIC) {
+            if (variable == PHASES + DIMENSIONS) {
+                real densities[2 * GHOSTS - 1], found[2];
+#pragma unroll
+                for (int n = 0; n < 2 * GHOSTS - 1; n++) densities[n] = density_at(P, cell_along<AXIS>(i, j, k, n + 1 - GHOSTS));
+                set(reconstructed(numbers, beyond_rest(numbers, cells, tuple_of<2 * GHOSTS - 1>(densities), fall)), found, 1);
+                const real weight = HALF * fall * densities[GHOSTS - 1];
+                found[0] += weight, found[1] += weight;
+                return tuple_of<2>(found);
+            }
+        }
         return SHARPENED && sharp ? sharpened(numbers, cells) : reconstructed(numbers, cells);
+    }
 }
 
 // Flux through the face between a cell and the next along AXIS; its velocity components are rotated. `rate`: faces of a
 // cell * dt/h. Whether it was limited.
 template <int AXIS>
-DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int j, int k, real rate, real *F, int step)
+DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int j, int k, real rate, const real *fall, real *F, int step)
 {
     if constexpr (RADIAL && AXIS == 0) rate = rate * metrics(STRETCH, i + 1);
     real left[VARIABLES], right[VARIABLES], low_mean[VARIABLES], high_mean[VARIABLES], value[FLUXES];
     const int low = cell(i, j, k), high = cell_along<AXIS>(i, j, k, 1);
 #pragma unroll
     for (int v = 0; v < VARIABLES; v++) {
-        const real *W = P + variable_at(v, AXIS) * SP;
-        const bool sharp = v == PHASES + DIMENSIONS + 1;
+        const int u = variable_at(v, AXIS);
+        const real *W = P + u * SP;
         low_mean[v] = W[low], high_mean[v] = W[high];
-        left[v] = W[low] + item<1>(increments<AXIS>(numbers, W, metrics, sharp, i, j, k));
-        right[v] = W[high] - item<0>(increments<AXIS>(numbers, W, metrics, sharp, i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
+        left[v] = W[low] + item<1>(increments<AXIS>(numbers, P, metrics, u, fall[AXIS], i, j, k));
+        right[v] = W[high] - item<0>(increments<AXIS>(numbers, P, metrics, u, fall[AXIS], i + (AXIS == 0), j + (AXIS == 1), k + (AXIS == 2)));
     }
     real jump = 0;
     if constexpr (TRANSVERSE_SENSOR) jump = jump_along_face<AXIS>(P + (PHASES + DIMENSIONS) * SP, i, j, k);
@@ -135,7 +161,7 @@ DEVICE bool flux(const auto &numbers, const real *P, Metrics metrics, int i, int
     const auto l = tuple_of<VARIABLES>(low_mean), r = tuple_of<VARIABLES>(high_mean);
     const auto f = tuple_of<FLUXES>(value);
     real c = minimum(sound_speed(numbers, L), sound_speed(numbers, R));
-    if constexpr (ASYMMETRIC) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
+    if constexpr (ASYMMETRIC && !RADIAL) c = minimum(c, minimum(sound_speed(numbers, l), sound_speed(numbers, r)));
     if (!(limiter_indicator(numbers, l, r, f, c, rate) < 0) || is_admissible(numbers, l, r, f, rate)) return false;
     set(limited_flux(numbers, l, r, f, jump, rate), F, step);
     return true;
@@ -251,13 +277,15 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
     // what leaves the cell, and the fluxes along z at its low and its high side
     real *const D = kept, *const low = kept + FLUXES * APART, *const high = low + FLUXES * APART;
     const real sides_of_cell = SHARES, rx = sides_of_cell * step_x, ry = sides_of_cell * step_y, rz = sides_of_cell * step_z;
+    real fall[3] = {0, 0, 0};
+    find_falls(numbers, dt, step_x, step_y, step_z, fall);
     int count = 0;  // faces at the low sides of the tile's cells whose flux this thread has limited
 
     // primitives of the first planes, and fluxes through the low side along z
     for (int k = -GZ; k < (GZ > 0 ? GZ : 1); k++) load_plane(numbers, states_now + u0, P, k, n, m, tx, ty, sy, sz, su);
     __syncthreads();
     if constexpr (DIMENSIONS > 2) {
-        if (inside) count += flux<2>(numbers, P, metrics, tx, ty, -1, rz, low, APART);
+        if (inside) count += flux<2>(numbers, P, metrics, tx, ty, -1, rz, fall, low, APART);
         if (sides & 16) {
             if (inside)
                 for (int v = 0; v < FLUXES; v++) F[v * FACES + ty * ROW + tx] = low[v * APART];
@@ -271,7 +299,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         // fluxes along x, and the first part of the divergence
         if (ty < m)
             for (int i = tx; i < n + 1; i += TILE_X)
-                count += flux<0>(numbers, P, metrics, i - 1, ty, k, rx, F + ty * ROW + i, FACES) && i < n;
+                count += flux<0>(numbers, P, metrics, i - 1, ty, k, rx, fall, F + ty * ROW + i, FACES) && i < n;
         __syncthreads();
         if (inside) {
 #pragma unroll
@@ -293,7 +321,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
             __syncthreads();
             if (tx < n)
                 for (int j = ty; j < m + 1; j += TILE_Y)
-                    count += flux<1>(numbers, P, metrics, tx, j - 1, k, ry, F + j * ROW + tx, FACES) && j < m;
+                    count += flux<1>(numbers, P, metrics, tx, j - 1, k, ry, fall, F + j * ROW + tx, FACES) && j < m;
             __syncthreads();
             if (inside) {
 #pragma unroll
@@ -308,7 +336,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 1) advance_tiles_kernel(PA
         // fluxes through the high side along z, which are those of the next plane's low side
         if constexpr (DIMENSIONS > 2) {
             if (inside) {
-                count += flux<2>(numbers, P, metrics, tx, ty, k, rz, high, APART) && k < l - 1;
+                count += flux<2>(numbers, P, metrics, tx, ty, k, rz, fall, high, APART) && k < l - 1;
 #pragma unroll
                 for (int v = 0; v < FLUXES; v++)
                     D[v * APART] = D[v * APART] + (high[position_of(v, 2) * APART] - low[position_of(v, 2) * APART]) * step_z;

@@ -56,10 +56,12 @@ from distfsi.formulas.symbols import (
     BISECTION_FALLBACK,
     DIMENSIONS,
     GHOSTS,
+    HYDROSTATIC,
     RADIAL,
     SHARES,
     TRANSVERSE_SENSOR,
     VARIABLES,
+    falls,
 )
 
 # ---- rows of faces ---------------------------------------------------------------------------------------------------
@@ -81,13 +83,19 @@ def find_primitives(states: States, tile: Tile, box: Box, P):
 
 
 @helper
+def fall_along(axis, step: StageStep):
+    """g h of the body force along an axis [m2/s2]; 0 without one."""
+    return falls(step.dt, step.x, step.y, step.z)[axis] if HYDROSTATIC else 0.0
+
+
+@helper
 def fluxes_x(tile: Tile, box: Box, step: StageStep, P, T, F, j, k):
     """Fluxes through the faces of row j in plane k along x; returns how many at low sides of cells were limited."""
     n, cell, variables = computed(tile.x, tile), cell_of(j, k, box) - 1, box.x * box.y * box.z
     if RADIAL:
         increments_in_r_row(P, T, cell, variables, increments_in(0, box), box.x, n + 2)
     else:
-        increments_row(P, T, cell, variables, 1, increments_in(0, box), box.x, n + 2)
+        increments_row(P, T, cell, variables, 1, increments_in(0, box), box.x, n + 2, fall_along(0, step))
     faces = Faces(
         cell=cell,
         variables=variables,
@@ -105,11 +113,12 @@ def fluxes_x(tile: Tile, box: Box, step: StageStep, P, T, F, j, k):
 
 
 @helper
-def find_increments_y(tile: Tile, box: Box, P, T, j, k):
+def find_increments_y(tile: Tile, box: Box, step: StageStep, P, T, j, k):
     """Increments of row j in plane k along y."""
     variables = box.x * box.y * box.z
     target = increments_in(slot_y(j + 2), box)
-    increments_row(P, T, cell_of(j, k, box), variables, box.x, target, box.x, computed(tile.x, tile))
+    n, fall = computed(tile.x, tile), fall_along(1, step)
+    increments_row(P, T, cell_of(j, k, box), variables, box.x, target, box.x, n, fall)
 
 
 @helper
@@ -133,11 +142,12 @@ def fluxes_y(tile: Tile, box: Box, step: StageStep, P, T, F, j, k, counted):
 
 
 @helper
-def find_increments_z(tile: Tile, box: Box, P, T, j, k):
+def find_increments_z(tile: Tile, box: Box, step: StageStep, P, T, j, k):
     """Increments of row j in plane k along z."""
     plane = box.x * box.y
     target = increments_in(slot_z(j, k + 2, box), box)
-    increments_row(P, T, cell_of(j, k, box), plane * box.z, plane, target, box.x, computed(tile.x, tile))
+    n, fall = computed(tile.x, tile), fall_along(2, step)
+    increments_row(P, T, cell_of(j, k, box), plane * box.z, plane, target, box.x, n, fall)
 
 
 @helper
@@ -193,8 +203,8 @@ def advance_cells(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stag
     # the low side along z
     if DIMENSIONS > 2:
         for j in range(m):
-            find_increments_z(tile, box, P, T, j, -1)
-            find_increments_z(tile, box, P, T, j, 0)
+            find_increments_z(tile, box, step, P, T, j, -1)
+            find_increments_z(tile, box, step, P, T, j, 0)
             count += fluxes_z(tile, box, step, P, T, F, j, 0, n)
             if sides & 16:
                 alike = tile.y if tile.uniform else 1
@@ -203,8 +213,8 @@ def advance_cells(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stag
     for k in range(l):
         # the low side along y of each plane
         if DIMENSIONS > 1:
-            find_increments_y(tile, box, P, T, -1, k)
-            find_increments_y(tile, box, P, T, 0, k)
+            find_increments_y(tile, box, step, P, T, -1, k)
+            find_increments_y(tile, box, step, P, T, 0, k)
             count += fluxes_y(tile, box, step, P, T, F, 0, k, n)
             if sides & 4:
                 alike = tile.z if tile.uniform else 1
@@ -214,10 +224,10 @@ def advance_cells(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stag
             # faces along x, and those at the high sides of the row
             count += fluxes_x(tile, box, step, P, T, F, j, k)
             if DIMENSIONS > 1:
-                find_increments_y(tile, box, P, T, j + 1, k)
+                find_increments_y(tile, box, step, P, T, j + 1, k)
                 count += fluxes_y(tile, box, step, P, T, F, j + 1, k, n if j < m - 1 else 0)
             if DIMENSIONS > 2:
-                find_increments_z(tile, box, P, T, j, k + 1)
+                find_increments_z(tile, box, step, P, T, j, k + 1)
                 count += fluxes_z(tile, box, step, P, T, F, j, k + 1, n if k < l - 1 else 0)
             # the new state, and what left the domain
             fluxes = row_fluxes(j, k, box)
@@ -238,6 +248,8 @@ def advance_tile(states: States, tiles: Tiles, tile: Tile, box: Box, step: Stage
 
 STAGE_FORMULAS = (
     "primitives",
+    "falls",
+    "beyond_rest",
     "reconstructed",
     "reconstructed_in_r",
     "sharpened",

@@ -132,13 +132,13 @@ def find_partners(begin, end, key, bond_count, keys, rows, partner):
 
 
 @driver
-def weigh_bonds(begin, end, reference, payload, bodies: Bodies, body, bonds: Bonds):
-    """Vectors and weights of the bonds."""
+def weigh_bonds(begin, end, reference, payload, smoothing, bonds: Bonds):
+    """Vectors and weights of the bonds, with the mean smoothing length (count,) of both ends."""
     for i in range(begin, end):
         for n in range(bonds.count[i]):
             j = bonds.partner[i, n]
             X = difference(reference, 0, j, i)
-            w = -payload[j, VOLUME] * smoothing_slope(dot(X, X), bodies.smoothing[body[i]])
+            w = -payload[j, VOLUME] * smoothing_slope(dot(X, X), 0.5 * (smoothing[i] + smoothing[j]))
             for d in static_range(DIMENSIONS):
                 bonds.geometry[i, n * (DIMENSIONS + 1) + d] = w * X[d]
             bonds.geometry[i, n * (DIMENSIONS + 1) + DIMENSIONS] = w

@@ -19,12 +19,21 @@ from distfsi.coupling.cut_cells.kernels.records import (
 from distfsi.coupling.cut_cells.kernels.redistribution import repeat_lane
 from distfsi.coupling.formulas.moving_wall import normal_of, stage_content, wall_impedance, wall_pressure
 from distfsi.coupling.kernels.cells import FLUID
-from distfsi.coupling.kernels.faces import BOX, LINE, flux_of_face, look_at_face
+from distfsi.coupling.kernels.faces import BOX, LINE, fall_along, flux_of_face, look_at_face
 from distfsi.device.markers import driver, helper, load, real, row, store, workspace
 from distfsi.fluid.kernels.records import Faces, position_of
-from distfsi.fluid.kernels.rows import face_fluxes, increments_row, primitives_row
+from distfsi.fluid.kernels.rows import density_at, face_fluxes, increments_row, primitives_row
 from distfsi.formulas.subset import static_range
-from distfsi.formulas.symbols import DIMENSIONS, FLUXES, LANES, PHASES, TRANSVERSE_SENSOR, VARIABLES, primitives
+from distfsi.formulas.symbols import (
+    DIMENSIONS,
+    FLUXES,
+    HYDROSTATIC,
+    LANES,
+    PHASES,
+    TRANSVERSE_SENSOR,
+    VARIABLES,
+    primitives,
+)
 from distfsi.formulas.tensors import dot
 from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, cell_volume, first_value
 
@@ -112,13 +121,21 @@ def primitives_of_faces(Q, P):
 
 
 @helper
-def stop_slopes(T, i, stops):
-    """The face in lane i gets no increments of the cells whose slopes it stops."""
+def stop_slopes(P, T, i, stops, fall):
+    """The face in lane i gets no increments of the cells whose slopes it stops, but for the weight of a body force,
+    with g h along the face's axis."""
+    stops_low = stops == STOPS_LOW or stops == STOPS_LOW + STOPS_HIGH
     for v in range(VARIABLES):
-        if stops == STOPS_LOW or stops == STOPS_LOW + STOPS_HIGH:
+        if stops_low:
             store(T, 2 * v * LANES + i, 0.0)
         if stops >= STOPS_HIGH:
             store(T, (2 * v + 1) * LANES + i, 0.0)
+    if HYDROSTATIC:
+        low, pressure = (LINE + 1) * LANES + i, PHASES + DIMENSIONS
+        if stops_low:
+            store(T, 2 * pressure * LANES + i, 0.5 * fall * density_at(P, low, BOX * LANES))
+        if stops >= STOPS_HIGH:
+            store(T, (2 * pressure + 1) * LANES + i, 0.5 * fall * density_at(P, low + LANES, BOX * LANES))
 
 
 @helper
@@ -148,12 +165,12 @@ def find_fluxes(begin, end, cells, faces, seen, flux, U, dt, grid: BlockGrid):
                 look_at_faces(U, Q, at, i, axis, grid)
             primitives_of_faces(Q, P)
             # their reconstruction, which ends at the wall
-            c = (LINE + 1) * LANES
-            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES)
-            for i in range(n):
-                stop_slopes(T, i, seen[faces[first + i]] - 1)
-            # fluxes
             h = grid.spacing[block_of(cells[faces[first] % per_axis // 2], grid), axis]
+            c, fall = (LINE + 1) * LANES, fall_along(axis, dt, dt / h)
+            increments_row(P, T, c, BOX * LANES, LANES, 0, 2 * LANES, 2 * LANES, fall)
+            for i in range(n):
+                stop_slopes(P, T, i, seen[faces[first + i]] - 1, fall)
+            # fluxes
             faces_of_box = Faces(
                 cell=c,
                 variables=BOX * LANES,
@@ -302,16 +319,18 @@ def advance_band(
 
 
 @helper
-def stop_at_wall(walls: Walls, at, axis, T, grid: BlockGrid):
-    """Set increments T around the face between a cell and the next along `axis` to 0 where a cell that makes them
-    is covered or behind a closed face; returns the aperture of the face."""
-    step = grid.steps[axis]
+def stop_at_wall(walls: Walls, at, axis, dt, P, T, grid: BlockGrid):
+    """Set increments T around the face between a cell and the next along `axis` to 0, or to the weight of a body force,
+    where one of the cells that make them is covered or behind a closed face; returns the aperture of the face."""
+    step, h = grid.steps[axis], grid.spacing[block_of(at, grid), axis]
     between = aperture_between(walls, at + step, axis, grid)
     for c in range(2):
         beyond = aperture_between(walls, at + 2 * c * step, axis, grid)
         if not (between > 0.0 and beyond > 0.0):
             for v in range(VARIABLES):
                 T[2 * v + c] = 0.0
+            if HYDROSTATIC:
+                T[2 * (PHASES + DIMENSIONS) + c] = 0.5 * fall_along(axis, dt, dt / h) * density_at(P, LINE + 1 + c, BOX)
     return between
 
 
@@ -329,9 +348,9 @@ def account_sides(begin, end, chosen, side_cells, side, passed, U, walls: Walls,
         b = block_of(low_cell, grid)
         amount = (2 * high - 1) * (weight * cell_volume(b, grid) / grid.spacing[b, axis])
         for seen in range(2):  # first as the stage does, which sees no wall
-            look_at_face(U, low_cell, axis, grid, P, T)
+            look_at_face(U, low_cell, axis, dt, grid, P, T)
             if seen == 1:
-                amount = -amount * stop_at_wall(walls, low_cell, axis, T, grid)
+                amount = -amount * stop_at_wall(walls, low_cell, axis, dt, P, T, grid)
             if amount != 0.0:
                 flux_of_face(P, T, F, dt / grid.spacing[b, axis], axis)
                 for v in range(PHASES + DIMENSIONS + 1):

@@ -99,7 +99,7 @@ def find_contents(begin, end, fresh, U, content, grid: BlockGrid):
 @helper
 def add_flux(passed, n, U, at, axis, dt, weight, grid: BlockGrid, P, T, F):
     """passed[n] += weight * flux through the face between a cell `at` and the next along `axis`."""
-    look_at_face(U, at, axis, grid, P, T)
+    look_at_face(U, at, axis, dt, grid, P, T)
     flux_of_face(P, T, F, dt / grid.spacing[block_of(at, grid), axis], axis)
     for v in range(PHASES + DIMENSIONS + 1):
         passed[n, v] += weight * load(F, 2 * position_of(v, axis))
