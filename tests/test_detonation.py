@@ -4,6 +4,7 @@ created."""
 import numpy as np
 import pytest
 
+from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
 from distfsi.fluid.marching import march
 from distfsi.laws.afterburn.miller import Miller
@@ -353,3 +354,24 @@ def test_a_detonation_goes_round_a_corner(scene):
     whole = run_of(simulation)
     energy = whole[4]
     assert np.abs(energy - energy[:, ::-1]).max() < 1e-9 * energy.max()
+
+
+def test_a_charge_beside_a_plate_keeps_its_energy(scene):
+    """Shares go through cut cells, and a front marches around the plate."""
+    plate = """
+[solid.bodies.plate]
+material = "steel 4340"
+failure = "none"
+shape = { kind = "box", lower = ["30 mm", "20 mm"], upper = ["42 mm", "30 mm"] }
+spacing = "1.5 mm"
+"""
+    text = BALL + plate
+    simulation = start(scene(text, "fluid.detonation.path=around", "time.maximum_steps=60"))
+    budget = Budget(simulation.fluid, simulation.solid, simulation.coupling)
+    first = budget.row(simulation)
+    while not simulation.done:
+        simulation.step()
+    last = budget.row(simulation)
+    assert abs(last["drift energy"]) < 1e-12 and abs(last["drift mass_2"]) < 1e-12
+    assert last["held by unburnt [J]"] < 0.5 * first["held by unburnt [J]"]
+    assert last["solid kinetic energy [J]"] > 0.0

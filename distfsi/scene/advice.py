@@ -63,7 +63,7 @@ def _unreached_ends(scene: Scene, layout: Layout) -> Iterator[str]:
     """Ends of the domain that even the fastest wave does not come near."""
     domain = scene.domain
     if scene.sources or (scene.fluid and scene.fluid.detonation):
-        return
+        return  # what moves is not there yet
     if not layout.sources.any():
         yield "nothing moves and no two states meet: the fluid stays as it is"
         return
