@@ -214,7 +214,7 @@ def test_a_burning_charge_is_mapped_with_its_shares(scene, tmp_path):
     mapped = Simulation.of(scene(rings + AFTERBURN), Communicator(), 1).fluid.held_energies()
     held = [float(last[f"held by {share} [J]"]) for share in ("unburnt", "afterburn")]
     assert mapped == pytest.approx(held, rel=1e-9) and 1e5 < held[0] < 3.2e6  # it is on fire
-    with pytest.raises(InputError, match="must both have an afterburn, or neither"):
+    with pytest.raises(InputError, match="fluid.afterburn.law: absent; was"):
         Simulation.of(scene(rings), Communicator(), 1)
 
 

@@ -336,6 +336,45 @@ def test_a_body_slides_along_a_wall_and_rests_on_it(tmp_path):
     assert np.abs(velocity - [1.0, 0.0]).max() < 1e-13
 
 
+@pytest.mark.full
+def test_a_pile_in_a_box_comes_to_rest(tmp_path):
+    """Nine discs and boxes that fall on each other, with friction between them: energy does not grow, and none gets
+    out."""
+    random, bodies = np.random.default_rng(3), []
+    for n in range(9):
+        x, y = np.array([0.2 + 0.3 * (n % 3), 0.18 + 0.34 * (n // 3)]) + random.uniform(-0.02, 0.02, 2)
+        disc = f'{{ kind = "ball", center = [{x}, {y}], radius = 0.12 }}'
+        box = f'{{ kind = "box", lower = [{x - 0.1}, {y - 0.09}], upper = [{x + 0.1}, {y + 0.09}] }}'
+        bodies.append(f"""[solid.bodies.b{n}]
+shape = {disc if n % 2 else box}
+spacing = 0.03
+density = 1000
+velocity = [{random.uniform(-0.5, 0.5)}, -1]
+eos = {{ kind = "linear", bulk_modulus = 2e6 }}
+strength = {{ kind = "elastic", shear_modulus = 1e6 }}
+""")
+    ends = 'x = ["wall", "wall"], y = ["wall", "outflow"]'
+    text = f"""domain = {{ lower = [0, 0], upper = [1, 1.4], cells = [20, 28], {ends} }}
+time.end = 2
+solid.friction = 0.3
+sources.g = {{ kind = "gravity", acceleration = [0, -10] }}
+{"".join(bodies)}"""
+    simulation = Simulation.of(scene_of(tmp_path, text), Communicator(), 1)
+    part = simulation.solid
+
+    def whole():
+        return energy(part) + 10.0 * (part.columns["mass"] * part.columns["position"][:, 1]).sum()
+
+    before = whole()
+    while not simulation.done:
+        simulation.step()
+        if simulation.steps % 100 == 0:
+            assert whole() < 1.0005 * before  # positions and velocities are half a step apart
+    x = part.columns["position"]
+    assert part.totals()["kinetic"] < 0.005 * before
+    assert (x > 0.0).all() and (x[:, 0] < 1.0).all()
+
+
 # ---- the clock -------------------------------------------------------------------------------------------------------
 
 
