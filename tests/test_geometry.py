@@ -225,9 +225,9 @@ def test_a_relaxed_packing_is_even_and_keeps_off_the_surface():
     nearest = cKDTree(positions).query(positions, k=2)[0][:, 1] / 0.02
     assert nearest.min() > 0.8 and nearest.mean() > 0.95
     depth = -distance(shape, positions) / 0.02
-    assert depth.min() > 0.3
+    assert depth.min() > 0.45
     outermost = depth[depth < 0.9]
-    assert abs(outermost.mean() - 0.5) < 0.1 and outermost.std() < 0.12
+    assert abs(outermost.mean() - 0.5) < 0.02 and outermost.std() < 0.03
 
 
 def test_a_symmetry_plane_cuts_a_composed_body():

@@ -24,15 +24,13 @@ def measure(
     lower: np.ndarray,
     upper: np.ndarray,
     faces: Sequence[Set[float]] | None = None,
-    cubes: int = MAXIMUM_CUBES,
 ) -> float:
     """Length, area or volume of the points inside the box [lower, upper] (D,) [m] whose `distance` is negative.
 
     `faces`: along each axis the coordinates of all the region's faces, where these are planes across the axes; then it
     is exact. Otherwise boxes that the surface may cut are halved along each axis, until it is flat: what a plane cuts
     off a box is exact. In the smallest boxes a curved surface is a plane, too, and points are counted beside edges;
-    this error goes with the square of their size, so most of it is extrapolated away from the last two passes. At most
-    so many `cubes` are looked at in one pass.
+    this error goes with the square of their size, so most of it is extrapolated away from the last two passes.
     """
     if faces is not None:
         return _between_faces(distance, lower, upper, faces)
@@ -51,7 +49,7 @@ def measure(
         parts, flat = parts_inside(distance, centers, signed, size, SMOOTH)
         sums.append(math.fsum(parts[flat]) * math.prod(size))
         total = math.fsum([*sums, math.fsum(parts[~flat]) * math.prod(size)])
-        if len(centers) * 2**D > cubes or size.max() < SMALLEST * (upper - lower).max():
+        if len(centers) * 2**D > MAXIMUM_CUBES or size.max() < SMALLEST * (upper - lower).max():
             return total + (total - before) / 3.0
         before = total
         centers = (centers[~flat][:, None] + children).reshape(-1, D)

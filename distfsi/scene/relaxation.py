@@ -14,6 +14,7 @@ PASSES = 60
 REACH = 1.6  # spacings: how far particles push each other
 STEP, LONGEST_STEP = 0.25, 0.1  # of a spacing: under the push of a touching particle; in one pass
 CLOSEST = 0.25  # spacings from the surface
+OUTERMOST, DRAWN = 0.85, 0.4  # particles less deep, in spacings, are drawn to half a spacing by this share in a pass
 MOVING = 4.0  # spacings from the surface: particles deeper inside stay in the lattice
 FINE = 0.5  # spacings between the nodes at which the depth is known
 
@@ -40,7 +41,9 @@ def relaxed(shape: Shape, spacing: float, volume: float) -> np.ndarray:
         length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300)
         points = points + np.where(moving[:, None], step * np.minimum(1.0, LONGEST_STEP * spacing / length), 0.0)
         signed, outward = depth.at(points)
-        points = points - np.maximum(signed + CLOSEST * spacing, 0.0)[:, None] * outward
+        layer = signed > -OUTERMOST * spacing
+        drawn = np.where(layer, np.maximum(DRAWN * (signed + 0.5 * spacing), signed + CLOSEST * spacing), 0.0)
+        points = points - drawn[:, None] * outward
     return points
 
 

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from distfsi.scene.description import Composed
-from distfsi.scene.measure import measure
 from distfsi.scene.units import length_factor
 
 SUFFIXES = (".stl", ".obj", ".ply")
 LEAF = 16  # triangles at most
 FAR = 2.5  # radii of a cluster of triangles: from there it acts as one dipole
-OPEN_CUBES = 6000  # looked at in one pass for the volume of a surface that is not watertight: each has its price
+POINTS = 32  # along the longest edge, at which the volume of a surface that is not watertight is looked at
 BLOCK = 100_000  # pairs of points and triangles looked at together
 
 
@@ -116,13 +115,16 @@ class Surface:
 
     @cached_property
     def volume(self) -> float:
-        """Of the inside [m3]: exact of a watertight surface, otherwise to about 1e-3."""
+        """Of the inside [m3]: exact of a watertight surface, otherwise to about 3e-3."""
         center = self.triangles.reshape(-1, 3).mean(axis=0)
         a, b, c = (self.triangles - center).transpose(1, 0, 2)
         if self.open_edges == 0:
             return abs(math.fsum(np.einsum("ij,ij->i", a, np.cross(b, c)))) / 6.0
-        corners = self.triangles.reshape(-1, 3)
-        return measure(self.distance, corners.min(axis=0), corners.max(axis=0), cubes=OPEN_CUBES)
+        lower, upper = self._tree.lower, self._tree.upper
+        counts = np.maximum(np.ceil(POINTS * (upper - lower) / (upper - lower).max()), 1).astype(int)
+        axes = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(lower, upper, counts, strict=True)]
+        points = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=1)
+        return float(self.contains(points).mean() * np.prod(upper - lower))
 
     @cached_property
     def faces(self) -> tuple[frozenset[float], ...] | None:
