@@ -7,6 +7,7 @@ import random
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -39,11 +40,12 @@ class Killed:
 
     def __init__(self, directory: Path, restart: str, *settings: str):
         words = [str(SCENE), restart, f"output.directory={directory}", *TINY, *settings]
+        self.said = tempfile.TemporaryFile("w+")  # noqa: SIM115
         self.process = subprocess.Popen(
             [sys.executable, str(Path(__file__).with_name("killing.py")), *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self.said,  # a file: a pipe that nobody empties would stop the runs
             text=True,
             env=ENVIRONMENT | {"PATH": "/usr/bin:/bin", "HOME": str(Path.home())},
         )
@@ -52,15 +54,20 @@ class Killed:
         """Exit code and number of operations of a run that is killed before this one; 0: not killed."""
         print(before, file=self.process.stdin, flush=True)
         answer = self.process.stdout.readline()
-        assert answer, self.process.communicate()[1]
+        assert answer, self._words()
         code, count = map(int, answer.split())
         return code, count
 
     def __enter__(self):
         return self
 
+    def _words(self) -> str:
+        self.said.seek(0)
+        return self.said.read()
+
     def __exit__(self, *_):
         self.process.communicate()
+        self.said.close()
 
 
 def contents(directory: Path) -> dict[str, bytes]:
