@@ -71,6 +71,41 @@ def test_the_budget_of_a_scene_without_a_force_has_no_column_for_it():
     assert not [name for name in Budget(simulation.fluid, None, None).columns if "force" in name]
 
 
+def test_a_round_column_closes(tmp_path):
+    """About the axis of radial coordinates: cells count with their volumes."""
+    path = tmp_path / "round.toml"
+    path.write_text(
+        """
+[domain]
+symmetry = "axisymmetric"
+lower = [0, 0]
+upper = ["0.4 m", "1 m"]
+cells = [8, 20]
+x = ["axis", "wall"]
+y = ["wall", "wall"]
+gravity = [0, -9.81]
+[time]
+end = "1 ms"
+[fluid.phases.water]
+eos = "stiffened_gas"
+gamma = 4.4
+p_inf = "600 MPa"
+[[fluid.regions]]
+phase = "water"
+density = 1000
+pressure = "1 bar"
+"""
+    )
+    simulation = start(load(path))
+    budget = Budget(simulation.fluid, None, None)
+    budget.row(simulation)
+    row = budget.row(advance(simulation))
+    assert max(abs(value) for name, value in row.items() if name.startswith("drift")) < 1e-12
+    mass = np.pi * 0.4**2 * 1000.0
+    assert row["fluid mass_1 [kg]"] == pytest.approx(mass, rel=1e-12)
+    assert row["body force momentum_y [N s]"] == pytest.approx(-G * mass * simulation.time, rel=1e-10)
+
+
 # ---- at rest ---------------------------------------------------------------------------------------------------------
 
 
