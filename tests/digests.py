@@ -10,7 +10,6 @@ import csv
 import hashlib
 import json
 import platform
-import re
 import sys
 import tempfile
 import time
@@ -28,44 +27,8 @@ from launch import ROOT, run_ranks
 TABLE = Path(__file__).with_suffix(".json")
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
-# Arrays that have other names now than in the table, for every case: {name in the table: name now}, and beginnings.
-RENAMED: dict[str, str] = {
-    "restart/accounts/values/scale": "restart/budget/values/scale",
-    "restart/accounts/values/start": "restart/budget/values/start",
-    "history.csv/sealed mass_1 [kg]": "history.csv/trapped mass_1 [kg]",
-    "history.csv/sealed mass_2 [kg]": "history.csv/trapped mass_2 [kg]",
-    "restart/coupling/cells/swept": "restart/coupling/cells/fluid_volume",
-    "restart/coupling/values/way": "restart/coupling/values/drift",
-    "restart/solid/particles/ball": "restart/solid/particles/inflation",
-    "restart/solid/particles/dust": "restart/solid/particles/lone",
-    "restart/solid/particles/around": "restart/solid/particles/neighbourhood_damage",
-    "restart/solid/particles/loose": "restart/solid/particles/detaching",
-    "restart/solid/particles/parted": "restart/solid/particles/rupture_length",
-    "restart/solid/particles/wear": "restart/solid/particles/ductile_damage",
-    "restart/solid/particles/toughness": "restart/solid/particles/strength_scatter",
-    "particles/wear": "particles/ductile_damage",
-    "particles/dust": "particles/lone",
-    "gauges/particle.csv/dust": "gauges/particle.csv/lone",
-}
-
-RENAMED_BEGINNINGS = {"history.csv/ledger ": "history.csv/coupling "}
-
-# Columns that particles have no longer where no law of their material remembers them.
-NOT_REMEMBERED = {
-    f"{place}/{name}"
-    for place in ("particles", "restart/solid/particles", "gauges/particle.csv")
-    for name in ("plastic_strain", "temperature", "ductile_damage", "damage")
-}
-
-# Columns that came later, and what else a restart keeps besides what it did when the table was made.
-ADDED = {
-    "restart/simulation/values/first_step",
-    "restart/solid/particles/touching",
-    "restart/solid/particles/wall_touching",
-}
-
-# What the history tells of a particle besides its number, which the table does not know.
-WHOSE_PARTICLE = re.compile(r" of body '[^']*' at \([^)]*\) m")
+# Arrays that have other names now than in the table, for every case: {name in the table: name now}.
+RENAMED: dict[str, str] = {}
 
 # The text of the scene: it tells of folders, and no step reads it. How evenly ranks share the work, and how
 # long it takes, is no result.
@@ -163,24 +126,14 @@ def digest(array: np.ndarray) -> str:
     return hashlib.sha256(f"{array.dtype.str} {array.shape} ".encode() + array.tobytes()).hexdigest()[:16]
 
 
-def renamed(name: str) -> str:
-    """What an array of the table is named now."""
-    for before, now in RENAMED_BEGINNINGS.items():
-        if name.startswith(before):
-            return now + name.removeprefix(before)
-    return RENAMED.get(name, name)
-
-
 def differences(expected: Digests, found: Digests) -> list[str]:
     """A line for each array whose bits differ, or that only one side has; `expected` has the names of the table."""
-    expected = {renamed(name): text for name, text in expected.items()}
+    expected = {RENAMED.get(name, name): text for name, text in expected.items()}
     names = sorted(expected.keys() | found.keys())
     return [
         f"{name}: {expected.get(name, 'not in the table')}, now {found.get(name, 'not written')}"
         for name in names
         if expected.get(name) != found.get(name)
-        and not (name in NOT_REMEMBERED and name not in found)
-        and not (name in ADDED and name not in expected)
     ]
 
 
@@ -227,10 +180,9 @@ def _by_id(arrays: dict[str, np.ndarray], identity: str, columns: str) -> dict[s
 
 
 def _read_csv(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a table as text, in which floats have all their bits; without where particles are."""
+    """The columns of a table as text, in which floats have all their bits."""
     with path.open(newline="") as file:
-        header, *rows = csv.reader(WHOSE_PARTICLE.sub("", line) for line in file)
-    header = [re.sub(r"(kg|N s|J|N)/m2?\]", r"\1]", name) for name in header]  # units that the table does not have
+        header, *rows = csv.reader(file)
     return {name: np.array([row[i].encode() for row in rows], "S") for i, name in enumerate(header)}
 
 

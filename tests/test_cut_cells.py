@@ -23,6 +23,7 @@ from distfsi.laws.solid.scatter import Scatter
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.scene import description as d
 from distfsi.scene.description import Ball, Box, HalfSpace
+from distfsi.solid import packed
 from distfsi.solid import solid as solid_part
 from mpi_coupling import AIR, AIR_AND_WATER, Coupled, body, gas, shock, sinking_plate, speck
 
@@ -402,7 +403,7 @@ def plate_between(monkeypatch, normal, thickness, speed, n):
     position = lattice @ frame.T + middle
     position = position[((position > -0.15) & (position < 1.15)).all(axis=1)]
     volume = np.full(len(position), thickness * h / layers * spacing ** (D - 1))
-    monkeypatch.setattr(solid_part, "pack", lambda *arguments: (position, volume))
+    monkeypatch.setattr(packed, "pack", lambda *arguments: (position, volume))
     plate = rigid(Box((0.0,) * D, (1.0,) * D), spacing, tuple(speed * normal))
     regions = [(gas(1e-3, 1e-4, (0,) * D), None), (gas(1.0, 1.0, (0,) * D), HalfSpace(tuple(middle), tuple(normal)))]
     return coupled([plate], regions, (0.0,) * D, (1.0,) * D, (n,) * D, block=n)
@@ -452,11 +453,12 @@ def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(monkeypatch, thi
 
 
 @pytest.mark.parametrize("longer", [3.5, pytest.param(8.0, marks=pytest.mark.full)])
-def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold(longer):
+def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold(longer, monkeypatch):
     """So that its particles are 1.75 or 4 cells apart; pressure 1e4 : 1. Farther apart they let gas pass, and the run
     goes on."""
     plate = rigid(Box((0.4, -0.2), (0.525, 1.2)), 1.0 / 32, (0.0, 0.0))
     regions = [(gas(1e-3, 1e-4, (0, 0)), None), (gas(1.0, 1.0, (0, 0)), Box((0.0, 0.0), (0.45, 1.0)))]
+    monkeypatch.setattr(solid_part, "contacts_of", lambda *_: [])  # it goes through the ends, which hold the gas alone
     case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (16, 16), block=16, form="total_lagrangian")
     c = case.solid.columns
     c["velocity"][:, 1] = 10.0 * (c["position"][:, 1] - 0.48)

@@ -373,5 +373,5 @@ spacing = "1.5 mm"
         simulation.step()
     last = budget.row(simulation)
     assert abs(last["drift energy"]) < 1e-12 and abs(last["drift mass_2"]) < 1e-12
-    assert last["held by unburnt [J]"] < 0.5 * first["held by unburnt [J]"]
-    assert last["solid kinetic energy [J]"] > 0.0
+    assert last["held by unburnt [J/m]"] < 0.5 * first["held by unburnt [J/m]"]
+    assert last["solid kinetic energy [J/m]"] > 0.0

@@ -13,6 +13,7 @@ from pathlib import Path
 from distfsi.errors import InputError
 
 PRIVATE = 0o700
+NUMBAS = "__pycache__"  # where numba keeps machine code, beside the modules
 
 
 def cache_directory() -> Path:
@@ -28,7 +29,8 @@ def kernel_cache() -> Path:
     if faults:
         raise InputError(faults)
     directory = cache_directory()
-    directory.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
+    for folder in (directory, directory / NUMBAS):
+        folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
     return directory
 
 
@@ -36,7 +38,7 @@ def cache_faults() -> list[str]:
     """Why the cache folder is not trusted: it, or where numba keeps machine code in it, belongs to somebody else, or
     others can write into it."""
     faults = []
-    for folder in (cache_directory(), cache_directory() / "__pycache__"):
+    for folder in (cache_directory(), cache_directory() / NUMBAS):
         try:
             found = folder.stat()
         except OSError:
