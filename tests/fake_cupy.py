@@ -27,6 +27,10 @@ class Array:
     def reshape(self, count):
         return Array(self._memory.reshape(count))
 
+    def __getitem__(self, part):
+        assert isinstance(part, slice)
+        return Array(self._memory[part])
+
     def set(self, host, stream=None):
         assert isinstance(stream, Stream) and host.dtype == self.dtype and host.shape == self.shape
         calls["set"] += 1
