@@ -61,11 +61,15 @@ def test_gas_in_a_closed_box_is_pressed_against_a_wall():
 
 
 @pytest.mark.parametrize(("name", "end", "top"), [("plate_impact", 1e-6, 1e8), ("free_plate", 0.1, 5.0)])
-def test_bodies_and_all_together_gain_what_is_free_gains(name, end, top):
+def test_bodies_and_all_together_gain_what_is_free_gains(tmp_path, name, end, top):
     """Plates that collide, and a plate between gases that takes sub-steps: the momentum of all but the walls'."""
     duration, begin = 0.7 * end, 0.2 * end
     pulse = f'sources.table={{kind="half_sine", acceleration={top}, duration={duration}, start={begin}}}'
-    simulation = Simulation.of(load(ROOT / f"inputs/{name}.toml", [pulse, f"time.end={end}"]), Communicator(), 1)
+    simulation = Simulation.of(
+        load(ROOT / f"inputs/{name}.toml", [pulse, f"time.end={end}", f'output.directory="{tmp_path}"']),
+        Communicator(),
+        1,
+    )
 
     def momentum():
         fluid, solid, coupling = simulation.fluid, simulation.solid.totals(), simulation.coupling

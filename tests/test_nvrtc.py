@@ -21,11 +21,12 @@ def texts_of(*scenes):
 
 
 def check_stage(row):
-    """Nothing is spilled, and of a float32 stage only the sums of what leaves the domain's sides are float64."""
+    """Nothing is spilled, and of a float32 stage only dt/h and the sums of what leaves the domain's sides are
+    float64."""
     assert row["spill stores"] == row["spill loads"] == row["stack"] == row["local memory"] == 0, row
     assert row["shared memory [B]"] <= SHARED
     if row["real"] == "float32":
-        assert row["float64"] < 40 < row["float32"]
+        assert row["float64"] < 60 < row["float32"]
 
 
 @pytest.mark.parametrize(("name", "dimensions", "real"), FEW)

@@ -55,7 +55,7 @@ position = [0.31, 0.02, 0.03]
 @pytest.fixture
 def small(tmp_path):
     path = tmp_path / "small.toml"
-    path.write_text(SMALL)
+    path.write_text(SMALL + f'[output]\ndirectory = "{tmp_path}/out"\n')
     return path
 
 

@@ -72,8 +72,9 @@ def test_members_of_a_protocol_are_documented(protocol):
 
 
 @pytest.mark.parametrize("scheme", ["cut_cells", "staircase", "immersed_boundary"])
-def test_a_coupled_run_has_the_attributes_of_the_protocols(scheme):
-    scene = load(ROOT / "inputs/gas_piston.toml", ["domain.cells=30", f"coupling.scheme={scheme}"])
+def test_a_coupled_run_has_the_attributes_of_the_protocols(scheme, tmp_path):
+    words = ["domain.cells=30", f"coupling.scheme={scheme}", f'output.directory="{tmp_path}"']
+    scene = load(ROOT / "inputs/gas_piston.toml", words)
     simulation = Simulation.of(scene, Communicator(), 1)
     simulation.step()
     parts = ((simulation.coupling, Coupling), (simulation.solid, Structure), (simulation.solid.device, Device))

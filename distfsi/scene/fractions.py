@@ -20,6 +20,7 @@ HALVINGS = 3  # of a cell that a curved or oblique surface may cut, along each a
 ACROSS = 16  # parts of a cell across the smallest extent of a shape
 LARGEST = 512  # parts across its largest extent, at most
 ONE = 1 << 40  # a whole cell where fractions are summed as integers
+ROUNDING = 4.0 / ONE  # of such a sum, in cells
 
 
 class Filled(NamedTuple):
@@ -55,9 +56,10 @@ def corrected(fractions: np.ndarray, filled: Filled, cells: float | None) -> np.
 
     f + k f (1 - f): what is empty or full remains so, and all others stay between.
     """
-    if cells is None or filled.room == 0:
+    missing = 0.0 if cells is None else cells - filled.cells
+    if abs(missing) <= ROUNDING or filled.room == 0:
         return fractions
-    k = min(max((cells - filled.cells) / (filled.room / ONE), -1.0), 1.0)
+    k = min(max(missing / (filled.room / ONE), -1.0), 1.0)
     return fractions + k * fractions * (1.0 - fractions)
 
 
