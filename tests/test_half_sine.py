@@ -65,11 +65,8 @@ def test_bodies_and_all_together_gain_what_is_free_gains(tmp_path, name, end, to
     """Plates that collide, and a plate between gases that takes sub-steps: the momentum of all but the walls'."""
     duration, begin = 0.7 * end, 0.2 * end
     pulse = f'sources.table={{kind="half_sine", acceleration={top}, duration={duration}, start={begin}}}'
-    simulation = Simulation.of(
-        load(ROOT / f"inputs/{name}.toml", [pulse, f"time.end={end}", f'output.directory="{tmp_path}"']),
-        Communicator(),
-        1,
-    )
+    words = [pulse, f"time.end={end}", f'output.directory="{tmp_path}"']
+    simulation = Simulation.of(load(ROOT / f"inputs/{name}.toml", words), Communicator(), 1)
 
     def momentum():
         fluid, solid, coupling = simulation.fluid, simulation.solid.totals(), simulation.coupling
