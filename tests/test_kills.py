@@ -88,7 +88,7 @@ def points_of(count: int, wanted: int) -> list[int]:
     return list(range(1, count + 1)) if wanted >= count else sorted(random.sample(range(1, count + 1), wanted))
 
 
-@pytest.mark.parametrize("wanted", [6, pytest.param(40, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
+@pytest.mark.parametrize("wanted", [3, pytest.param(40, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
 def test_a_start_upon_earlier_results(tmp_path, wanted):
     """Killed at any file operation: each earlier file is in the directory or set aside, bytes as they were; what no run
     has made stays where it is; the next start makes the same results as in an empty directory."""
@@ -124,7 +124,7 @@ def test_a_start_upon_earlier_results(tmp_path, wanted):
     print(f"killed at {len(points)} of {count} operations")
 
 
-@pytest.mark.parametrize("wanted", [4, pytest.param(30, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
+@pytest.mark.parametrize("wanted", [2, pytest.param(30, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
 def test_a_finished_run_that_is_extended(tmp_path, wanted):
     """Killed at any file operation, it goes on in the end to the files of a run that was extended undisturbed."""
     directory = tmp_path / "out"

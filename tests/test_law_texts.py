@@ -1,6 +1,7 @@
 """Every law of solids in CUDA C, run on the host: the bits of the CPU's kernels."""
 
 import numpy as np
+import pytest
 
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostRuntime
@@ -44,6 +45,7 @@ def test_no_law_is_left_out():
         assert set(laws_of(kind)) == {type(body[place]) for body in BODIES if body[place]}
 
 
+@pytest.mark.full
 def test_the_cuda_c_of_all_laws_has_the_bits_of_the_cpu():
     D = 2
     bodies = [body_of(*body, D=D) for body in BODIES]
