@@ -24,11 +24,12 @@ from distfsi.scene.packing import pack
 from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_steps
 from distfsi.simulation import deal_blocks
 
-PROCESS_BYTES = 280e6  # of a rank that computes next to nothing: Python, its libraries, compiled kernels
-PICTURE_BYTES = 25e6  # of the maps of a fluid in the summary
+PROCESS_BYTES = 140e6  # of a rank that has no blocks: Python and its libraries
+KERNEL_BYTES = 102e6  # of numba and compiled kernels, where there are blocks
+DRAWING_BYTES, PICTURE_BYTES = 45e6, 25e6  # on the first rank: of matplotlib, of the maps of a fluid in the summary
 COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
-    "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 6600.0},
+    "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 4300.0},
     "updated_lagrangian": {1: 900.0, 2: 1250.0, 3: 2800.0},
 }
 FLOAT, VECTOR = 8, 24  # bytes of a value in a field file
@@ -109,15 +110,25 @@ class Resources:
 
     def memory(self) -> float:
         """Of the rank that takes most, at its peak."""
-        picture = PICTURE_BYTES if self.scene.fluid and self.dimensions > 1 else 0.0
-        coupling = COUPLING_BYTES * self.dimensions if self.scene.fluid and self.scene.solid else 0.0
-        return PROCESS_BYTES + picture + coupling + self.arrays()
+        drawing = DRAWING_BYTES + (PICTURE_BYTES if self.scene.fluid and self.dimensions > 1 else 0.0)
+        kernels = KERNEL_BYTES
+        if self.scene.fluid and self.scene.solid:
+            kernels += COUPLING_BYTES * self.dimensions
+        first, *others = (
+            PROCESS_BYTES + arrays + (kernels if blocks.local_count else 0.0)
+            for blocks, arrays in zip(self.blocks, self._arrays(), strict=True)
+        )
+        return max([first + drawing, *others])
 
     def arrays(self) -> float:
         """Cells and particles of the rank that takes most."""
+        return max(self._arrays())
+
+    def _arrays(self) -> list[float]:
+        """Cells and particles of each rank."""
         solid = self.scene.solid
         particles = (PARTICLE_BYTES[solid.form][self.dimensions] if solid else 0.0) * self.particles_of_ranks
-        return max(self.field_bytes(blocks) + p for blocks, p in zip(self.blocks, particles, strict=True))
+        return [self.field_bytes(blocks) + float(p) for blocks, p in zip(self.blocks, particles, strict=True)]
 
     def field_bytes(self, blocks: Blocks) -> float:
         """Fields of a rank's cells with their ghosts and padding, and those made for a field file."""
