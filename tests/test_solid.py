@@ -151,11 +151,13 @@ def rubber_rings(share, time):
 
 
 @pytest.mark.full
-def test_rubber_rings_collide_and_part_whole_with_artificial_stress_alone():
-    (without, _), (part, kept) = (rubber_rings(share, 165.0) for share in (0.0, 0.3))
-    broken, whole = (pieces(p.columns["position"], np.ones(2), RUBBER_SPACING) for p in (without, part))
-    assert broken > whole == 1
-    assert part.columns["position"][:, 0].min() > 2.0 * RUBBER_SPACING  # from the middle: the rings have parted
+def test_rubber_rings_collide_and_part_whole():
+    """Contact of surfaces tears nothing out of them; with artificial stress they part sooner."""
+    (without, _), (part, kept) = (rubber_rings(share, 200.0) for share in (0.0, 0.3))
+    for rings in (without, part):
+        assert pieces(rings.columns["position"], np.ones(2), RUBBER_SPACING) == 1
+    closest, far = (rings.columns["position"][:, 0].min() for rings in (without, part))
+    assert far > max(2.0 * RUBBER_SPACING, closest)  # from the middle: the rings have parted
     assert part.totals()["momentum"][0] > 0.0
     assert kept == pytest.approx(1.0, rel=1e-10)
 

@@ -129,7 +129,7 @@ def example(name):
         return 1.0
     if name == "kind":
         return np.zeros(1, np.int8)
-    dimensions = 5 if name == "field" else 2 if word in TABLES else 1
+    dimensions = 5 if name == "field" else 2 if word in TABLES or name == "grid_spacing" else 1
     return np.zeros((1,) * dimensions, np.int64 if word in INTEGERS else float)
 
 
