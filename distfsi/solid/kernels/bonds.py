@@ -70,7 +70,7 @@ from distfsi.solid.kernels.records import (
 EXPOSED_BELOW = 0.75  # determinant of the moment of a particle's bonds, 1 inside a body
 DETACHING_BELOW = 0.1  # smallest eigenvalue of the moment, below which the gradient's correction fades
 FLAT = 2.0  # shortest principal stretches to which viscosity sees a particle: with more it swings from step to step
-CRUSHED = 0.05  # shortest principal stretch, below which a particle detaches
+CRUSHED = 0.055  # shortest principal stretch, below which a particle detaches
 MINIMUM_FITTED = 0.5  # of the volume that the material has: bonds on one side alone may make it any
 
 
