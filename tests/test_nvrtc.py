@@ -40,8 +40,8 @@ def test_the_stage_spills_nothing(name, dimensions, real):
 
 
 def test_solid_and_coupling_compile():
-    """A plate between gases; all kernels are compiled once and kept."""
-    texts = texts_of(load(ROOT / "inputs/thin_plate.toml"))
+    """A plate between gases, and plates that meet; all kernels are compiled once and kept."""
+    texts = texts_of(*(load(ROOT / f"inputs/{name}.toml") for name in ("thin_plate", "plate_impact")))
     names = {of.kernel.name for text, of in texts.items() if nvrtc.cubin(of.kernel.name, text, "sm_90")}
     assert {"find_band", "advance_band", "deform", "accelerate_bonds", "mark_exposed", "pack_rows"} <= names
 

@@ -174,8 +174,7 @@ class Text:
 
 
 def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, Text]:
-    """Each text of all kernels of all scenes, once, in the order of scenes. Raises KeyError for a kernel of which no
-    scene shows what it is called with."""
+    """Each text of all kernels of all scenes, once, in the order of scenes; without kernels that no scene calls."""
     debris = calls_of_debris(communicator) if any(scene.solid for scene in scenes.values()) else {}
     found = [(name, scene, inventory(scene, communicator)) for name, scene in scenes.items()]
     known: dict[tuple[str, Callable], Calls] = {}
@@ -188,7 +187,8 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
         called = {id(kernel) for kernel, _ in gpu.calls.values()}
         others = [kernel for kernel in gpu.built if id(kernel) not in called]
         calls = [*gpu.calls.values()]
-        calls += [(kernel, a) for kernel in others for _, a in known[precision(scene), kernel.driver].values()]
+        shown = [(kernel, known.get((precision(scene), kernel.driver), {})) for kernel in others]
+        calls += [(kernel, arguments) for kernel, ones in shown for _, arguments in ones.values()]
         for kernel, arguments in calls:
             given = kernel.given(arguments)
             key = repr(kernel), kernel.signature(given)
