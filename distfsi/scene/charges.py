@@ -45,8 +45,6 @@ class ChargeInput(Table):
     def _has_edges(self) -> ChargeInput:
         if min(self.proportions) <= 0.0:
             raise ValueError("proportions must be positive")
-        if not any(self.axis):
-            raise ValueError("axis must not be zero")
         return self
 
 

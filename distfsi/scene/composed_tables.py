@@ -137,8 +137,6 @@ def _turned(
         raise ValueError("nothing turns in one dimension")
     if (axis is None) != (D == 2):
         raise ValueError("an axis is needed" if D == 3 else "there is no axis in two dimensions")
-    if axis is not None and not any(axis):
-        raise ValueError("axis must not be zero")
     return placed(shape, Similarity.about(about or (0.0,) * D, rotation(D, angle, axis or ())))
 
 
@@ -165,8 +163,6 @@ class Mirror(Composed):
     normal: Direction = Field(description="normal of the plane, of any length")
 
     def build(self) -> description.Shape:
-        if not any(self.normal):
-            raise ValueError("normal must not be zero")
         return placed(self.shape.build(), Similarity.about(self.point, reflection(self.normal)))
 
 

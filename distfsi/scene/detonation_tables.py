@@ -46,12 +46,6 @@ class PlaneDetonator(Mirror):
     normal: Direction = Field(description="its normal; any length")
     delay: Delay = Field(0.0, description="when, after the start")
 
-    @model_validator(mode="after")
-    def _has_direction(self) -> PlaneDetonator:
-        if not any(self.normal):
-            raise ValueError("normal must not be zero")
-        return self
-
 
 DetonatorInput = Annotated[PointDetonator | LineDetonator | PlaneDetonator, Field(discriminator="kind")]
 

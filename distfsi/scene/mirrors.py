@@ -51,12 +51,6 @@ class HalfSpace(Mirror):
     point: Position = Field(description="a point of the plane")
     normal: Direction = Field(description="normal of the plane, pointing out; any length")
 
-    @model_validator(mode="after")
-    def _has_direction(self) -> HalfSpace:
-        if not any(self.normal):
-            raise ValueError("normal must not be zero")
-        return self
-
 
 class Tube(Mirror):
     """Ring (2D) or spherical shell (3D)."""

@@ -227,8 +227,6 @@ class MotionInput(Table):
                 raise ValueError(f"{name} has {len(given)} rows, times {rows}")
             if given is not None and np.any(np.asarray(given[0])):
                 raise ValueError(f"{name} must begin with 0: the shape is where the obstacle is at the start")
-        if self.axis is not None and not any(self.axis):
-            raise ValueError("axis must not be zero")
         return self
 
 

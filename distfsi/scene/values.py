@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from distfsi.scene.units import to_si
@@ -65,6 +65,17 @@ def counts(minimum: int) -> Any:
     return Annotated[tuple[number, ...], Field(min_length=1, max_length=3), as_list, WithJsonSchema(shown)]
 
 
+def direction() -> Any:
+    """Type of a vector of any length but zero."""
+
+    def points_somewhere(value: tuple[float, ...]) -> tuple[float, ...]:
+        if not any(value):
+            raise ValueError("is no direction, which must not be zero")
+        return value
+
+    return Annotated[vector("1"), AfterValidator(points_somewhere)]
+
+
 def _phase_name(value: Any, info: ValidationInfo) -> Any:
     names = (info.context or {}).get("phases", ())
     if isinstance(value, str) and names and value not in names:
@@ -86,6 +97,6 @@ Speed = quantity("m/s", gt=0.0)
 Position = vector("m")
 Velocity = vector("m/s")
 Acceleration = vector("m/s2")
-Direction = vector("1")
+Direction = direction()
 PhaseName = Annotated[str, BeforeValidator(_phase_name)]
 Count = Annotated[int, Field(strict=True, ge=1, le=LARGEST_COUNT)]
