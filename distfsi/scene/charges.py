@@ -54,13 +54,13 @@ def add_charges(data: dict[str, Any]) -> tuple[list[Fault], list[Fault]]:
     Charges that are wrong in themselves are left to the check of their tables.
     """
     charges, fluid = data.get("charges"), data.setdefault("fluid", {}) if data.get("charges") else None
-    if not isinstance(charges, list) or not isinstance(fluid, dict):
-        return [], []
+    if not isinstance(charges, list) or not isinstance(fluid, dict) or not _takes_charges(fluid):
+        return [], []  # what is wrong there is told of these tables
     domain = data.get("domain")
     domain = domain if isinstance(domain, dict) else {}
     cells = domain.get("cells")
     dimensions = len(cells) if isinstance(cells, list) else 1
-    shapes = SHAPES.get((dimensions, domain.get("symmetry", "planar")))
+    shapes = SHAPES.get((dimensions, str(domain.get("symmetry", "planar"))))
     if shapes is None:
         text = "a mass needs three dimensions, or spherical or axisymmetric coordinates; else give a region"
         return [Fault(("charges",), text)], []
@@ -86,6 +86,15 @@ def add_charges(data: dict[str, Any]) -> tuple[list[Fault], list[Fault]]:
     return faults, notes
 
 
+def _takes_charges(fluid: dict[str, Any]) -> bool:
+    """Whether what charges are added to is of the right kind as far as it is there."""
+    detonation = fluid.get("detonation", {})
+    wanted = ((fluid.get("regions", []), list), (fluid.get("phases", {}), dict), (detonation, dict))
+    if not all(isinstance(found, kind) for found, kind in wanted):
+        return False
+    return isinstance(detonation.get("detonators", []), list)
+
+
 def _add_charge(charge: ChargeInput, material: Material, fluid: dict[str, Any]) -> str:
     """Put one charge into the fluid; what it is, in words."""
     explosive = material.detonation
@@ -104,8 +113,8 @@ def _add_charge(charge: ChargeInput, material: Material, fluid: dict[str, Any]) 
 def _phase(material: Material, fluid: dict[str, Any]) -> str:
     """The name of the fluid's phase of a material, which is added if there is none."""
     phases = fluid.setdefault("phases", {})
-    for name, table in phases.items() if isinstance(phases, dict) else ():
-        if isinstance(table, dict) and find(table.get("material")) is material:
+    for name, table in phases.items():
+        if isinstance(table, dict) and find(str(table.get("material"))) is material:
             return str(name)
     name = material.name.lower().replace(" ", "_")
     phases[name] = {"material": material.name}
