@@ -222,3 +222,25 @@ def test_any_mutation_gets_a_report_or_is_refused(tmp_path, text):
     else:
         if math.prod(scene.domain.cells) < 1e6:
             assert report(scene).startswith(scene.title)
+
+
+RAW = (
+    *("domain.symmetry", "domain.cells", "time", "output", "stages", "stages.0", "charges", "charges.0.material"),
+    *("charges.0.mass", "fluid", "fluid.regions", "fluid.phases", "fluid.phases.air", "fluid.phases.air.material"),
+    *("fluid.detonation", "fluid.detonation.detonators", "fluid.map", "fluid.afterburn"),
+)
+
+
+@pytest.mark.parametrize("key", RAW)
+def test_what_is_read_before_tables_are_checked_may_be_anything(tmp_path, key):
+    """Charges, stages and materials change an input before its tables are known to be sound."""
+    text = (ROOT / "inputs/airblast_sphere.toml").read_text()
+    staged = text + "\n[[stages]]\ntime = { end = 1e-6 }\n"
+    for number, scene in enumerate((text, staged)):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(scene)
+        for value in ("[]", "3", '"x"', "{}", "[1]", "true", "[[]]", "[{}]"):
+            try:
+                load(path, [f"{key}={value}"])
+            except InputError as error:
+                assert error.faults

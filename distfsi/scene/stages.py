@@ -20,8 +20,12 @@ def stage_inputs(data: dict[str, Any], stem: str) -> list[dict[str, Any]]:
     """The whole inputs of the stages of an input, which gets the last one to go on from. Empty where a table is none:
     validation tells that."""
     stages, fluid = data.get("stages"), data.get("fluid")
+    if not stages or not isinstance(stages, list) or not all(isinstance(table, dict) for table in (fluid, *stages)):
+        return []
     output = data.get("output", {})
-    if not stages or not all(isinstance(table, dict) for table in (output, *stages)) or not isinstance(fluid, dict):
+    tables = [output, data.get("time", {}), fluid.get("map", {})]
+    tables += [stage.get(key, {}) for stage in stages for key in ("time", "map")]
+    if not all(isinstance(table, dict) for table in tables):
         return []
     directory = output.get("directory") or f"out/{stem}"
     before, inputs = None, []
