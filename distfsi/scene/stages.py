@@ -20,7 +20,9 @@ def stage_inputs(data: dict[str, Any], stem: str) -> list[dict[str, Any]]:
     """The whole inputs of the stages of an input, which gets the last one to go on from. Empty where a table is none:
     validation tells that."""
     stages, fluid = data.get("stages"), data.get("fluid")
-    if not stages or not isinstance(stages, list) or not all(isinstance(table, dict) for table in (fluid, *stages)):
+    if not stages or not isinstance(stages, list) or not isinstance(fluid, dict):
+        return []
+    if not all(isinstance(stage, dict) for stage in stages):
         return []
     output = data.get("output", {})
     tables = [output, data.get("time", {}), fluid.get("map", {})]
