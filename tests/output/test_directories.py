@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from test_kills import contents
 
 from distfsi.commands.line import main
 from distfsi.errors import InputError
@@ -17,8 +18,7 @@ from distfsi.output.directory import held
 from distfsi.output.history import read_history
 from distfsi.run import run
 from distfsi.scene import load
-from launch import ROOT
-from test_kills import contents
+from launch import ROOT, SUPPORT
 
 SOD = ROOT / "inputs" / "sod.toml"
 TINY = ("domain.cells=16", "performance.block_cells=8", "performance.tile_cells=8", "time.maximum_steps=2")
@@ -133,7 +133,7 @@ HOLD = """
 import sys, time
 from pathlib import Path
 from distfsi.output.directory import held
-from test_output import OneRank
+from one_rank import OneRank
 with held(Path(sys.argv[1]), OneRank()):
     print("held", flush=True)
     time.sleep(60)
@@ -143,7 +143,7 @@ with held(Path(sys.argv[1]), OneRank()):
 @pytest.fixture
 def holder(tmp_path):
     """Another process that holds the directory as a run does."""
-    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    path = os.pathsep.join([str(ROOT), str(SUPPORT)])
     process = subprocess.Popen(
         [sys.executable, "-c", HOLD, str(tmp_path)],
         stdout=subprocess.PIPE,

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from launch import ENVIRONMENT, ROOT, run_ranks
-from test_restart import results
+from launch import ENVIRONMENT, ROOT, SUPPORT, run_ranks
+from results import results
 
 SCENE = ROOT / "inputs" / "sod.toml"
 TINY = (
@@ -42,7 +42,7 @@ class Killed:
         words = [str(SCENE), restart, f"output.directory={directory}", *TINY, *settings]
         self.said = tempfile.TemporaryFile("w+")  # noqa: SIM115
         self.process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("killing.py")), *words],
+            [sys.executable, str(SUPPORT / "killing.py"), *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.said,  # a file: a pipe that nobody empties would stop the runs
@@ -150,7 +150,7 @@ def test_a_finished_run_that_is_extended(tmp_path, wanted):
 )
 def test_a_week_in_a_minute(tmp_path, steps, kills):
     """A restart file every ten steps; killed at random moments, each time going on with another number of ranks."""
-    script = Path(__file__).with_name("mpi_kills.py")
+    script = SUPPORT / "mpi_kills.py"
     settings = (
         *("domain.cells=64", "performance.block_cells=8", "performance.tile_cells=8", "time.cfl=0.05", "time.end=10"),
         *(f"time.maximum_steps={steps}", "output.fields_every=0.01", "output.history_every=7"),

@@ -23,8 +23,10 @@ from distfsi.output.history import History, read_history
 from distfsi.output.picture import Figure, draw_summary
 from distfsi.output.scales import scaled
 from distfsi.output.schedule import Every
+from launch import SUPPORT
+from one_rank import OneRank
 
-SCRIPT = Path(__file__).with_name("mpi_output.py")
+SCRIPT = SUPPORT / "mpi_output.py"
 RANKS = (1, 2, 4)
 
 
@@ -152,29 +154,6 @@ def test_no_particles_and_ranks_without_particles(runs, ranks):
     assert read_with_vtk(few).GetNumberOfVerts() == len(columns["id"]) > 0
     assert np.array_equal(columns["pressure"], mpi_output.pressure(*columns["position"].T, time))
     assert series(runs[ranks] / "no_particles", "cells") == []
-
-
-class OneRank:
-    """A single rank that writes files like the real one, and dies on demand after writing some of the arrays."""
-
-    rank = 0
-
-    def __init__(self, dies: bool = False):
-        self.dies = dies
-
-    def broadcast(self, value):
-        return value
-
-    def allgather(self, value):
-        return [value]
-
-    def write_at(self, path, offsets, arrays):
-        with Path(path).open("r+b") as file:
-            for offset, array in list(zip(offsets, arrays, strict=True))[: 1 if self.dies else None]:
-                file.seek(offset)
-                file.write(array.tobytes())
-        if self.dies:
-            raise KeyboardInterrupt
 
 
 @pytest.fixture

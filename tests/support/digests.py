@@ -1,7 +1,7 @@
 """Digests of all that a run leaves behind: a short sum per array, by which two versions of the code are compared.
 
-`python tests/digests.py [case ...]` runs the cases named, or all, and writes their digests into digests.json. To be
-used when results are meant to change; where only the structure of the code changes, the table stays.
+`python tests/support/digests.py [case ...]` runs the cases named, or all, and writes their digests into digests.json.
+To be used when results are meant to change; where only the structure of the code changes, the table stays.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from launch import ROOT
+
 PACKAGE = ROOT / "distfsi"
 
 # From the top down. A folder imports only from those further down; those of one row do not know each other.

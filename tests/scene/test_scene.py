@@ -1,7 +1,6 @@
 """Reading inputs: every example loads, every fault is told, units and overrides."""
 
 import json
-from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -25,8 +24,8 @@ from distfsi.scene.description import Ball
 from distfsi.scene.reference import markdown
 from distfsi.scene.thermodynamics import energy, pressure, sound_speed_squared
 from distfsi.scene.units import UNITS, parse_unit, to_si
+from launch import ROOT
 
-ROOT = Path(__file__).parent.parent
 INPUTS = sorted((ROOT / "inputs").glob("*.toml"))
 TUBE = ROOT / "inputs" / "steel_tube.toml"
 

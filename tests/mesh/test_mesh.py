@@ -1,7 +1,5 @@
 """Blocks, ghost cells, particles on the move, and ranks that fail; the rank-parallel checks are in mpi_mesh.py."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,9 +15,9 @@ from distfsi.mesh.kernels.particles import EXCHANGE
 from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.regions import source_cell
-from launch import run_ranks
+from launch import SUPPORT, run_ranks
 
-SCRIPT = Path(__file__).parent / "mpi_mesh.py"
+SCRIPT = SUPPORT / "mpi_mesh.py"
 
 
 @pytest.fixture(scope="module")

@@ -183,10 +183,10 @@ def test_a_void_that_opens_inside_the_solid_holds_gas_at_rest():
 
 @pytest.fixture(scope="module")
 def one_rank():
-    return run_ranks(1, ["tests/mpi_coupling.py"], 300)
+    return run_ranks(1, ["tests/support/mpi_coupling.py"], 300)
 
 
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.full)])
 def test_same_bits_on_any_number_of_ranks_and_threads_and_for_any_blocks(one_rank, ranks):
     assert one_rank.count("\n") == 6
-    assert run_ranks(ranks, ["tests/mpi_coupling.py"], 300) == one_rank
+    assert run_ranks(ranks, ["tests/support/mpi_coupling.py"], 300) == one_rank

@@ -11,8 +11,8 @@ library, which has others for CPUs with fused multiplication; and the powers of 
 set up, have other bits with vectors of 512 bits. So on another machine only the cases of EVERYWHERE, which have none of
 them, are compared with the table; the others run on one rank and on two, which must agree, and warn that this is all.
 
-`python tests/digests.py [case ...]` writes the table anew, for results that are meant to change. Where only names have
-changed, they belong into RENAMED in digests.py.
+`python tests/support/digests.py [case ...]` writes the table anew, for results that are meant to change. Where only
+names have changed, they belong into RENAMED in digests.py.
 """
 
 import warnings

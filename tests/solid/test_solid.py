@@ -208,9 +208,9 @@ def test_an_elastic_wave_travels_with_the_longitudinal_speed():
 
 @pytest.fixture(scope="module")
 def one_rank():
-    return run_ranks(1, ["tests/mpi_solid.py"], 300)
+    return run_ranks(1, ["tests/support/mpi_solid.py"], 300)
 
 
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.full)])
 def test_same_bits_on_any_number_of_ranks_and_threads(one_rank, ranks):
-    assert run_ranks(ranks, ["tests/mpi_solid.py"], 300) == one_rank
+    assert run_ranks(ranks, ["tests/support/mpi_solid.py"], 300) == one_rank

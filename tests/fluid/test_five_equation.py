@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from test_tubes import PRODUCTS_AIR, STIFF, TUBES
 
 from distfsi.diagnostics.budget import Budget
 from distfsi.scene.description import Box, FluidState, Region
 from fluids import AIR, TNT, WATER
-from test_tubes import PRODUCTS_AIR, STIFF, TUBES
 from tubes import PERIODIC, advance, fields, scene_of, start
 
 METHOD = {"reconstruction": "van_leer", "model": "five_equation"}

@@ -25,12 +25,12 @@ from distfsi.output.restart import FORMAT, Restart, newest_restart
 from distfsi.run import run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from launch import ENVIRONMENT, ROOT, run_ranks
+from launch import ENVIRONMENT, ROOT, SUPPORT, run_ranks
+from results import results
 
-SCRIPT = Path(__file__).with_name("mpi_restart.py")
+SCRIPT = SUPPORT / "mpi_restart.py"
 TUBE = ROOT / "inputs/steel_tube.toml"
 STEPS = 120
-NO_RESULT = ("balance.csv", "performance.csv")
 COARSE = (
     "domain.cells=[28, 28]",
     "domain.upper=['56 mm', '56 mm']",
@@ -60,14 +60,6 @@ def words(directory, *more, restart=None):
 def run_here(directory, *more, restart=None):
     """Run the coarse tube in this process."""
     return run(load(TUBE, overrides(directory, *more)), Communicator(), 1, restart)
-
-
-def results(directory):
-    """The bytes of all files of results in a directory, by name; how long the work takes and how evenly ranks share it
-    is no result, and those of earlier runs are not looked at."""
-    paths = [path for kind in ("*.csv", "*.vtkhdf", "*.series") for path in directory.rglob(kind)]
-    named = {str(path.relative_to(directory)): path for path in paths if path.name not in NO_RESULT}
-    return {name: path.read_bytes() for name, path in named.items() if not name.startswith("earlier-")}
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from distfsi.device.llvm_types import Array
 from distfsi.device.native import Native
 from distfsi.device.source import Bound
 from emitted import constants_are_folded, cubed, exponentials_of, material, scaled, text_of, two_materials
-from launch import ROOT
+from launch import ROOT, SUPPORT
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +81,7 @@ print(B[0], compilation.made)
 
 def test_a_second_process_finds_the_compiled_module(tmp_path, monkeypatch):
     monkeypatch.setenv("DISTFSI_CACHE", str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT}:{ROOT / 'tests'}")
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT}:{SUPPORT}")
     runs = [
         subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120, check=True).stdout
         for _ in range(2)

@@ -15,11 +15,11 @@ import pytest
 
 from distfsi import simulation
 from distfsi.output.fields import series
-from launch import ENVIRONMENT, ROOT
+from launch import ENVIRONMENT, ROOT, SUPPORT
 
 FOLDER = ROOT / "launch"
 SCRIPTS = sorted(path for path in FOLDER.rglob("*") if path.suffix in (".sh", ".sbatch", ".pbs", ".lsf"))
-STUB = Path(__file__).with_name("batch_stub.py")
+STUB = SUPPORT / "batch_stub.py"
 SCENE = """
 [domain]
 lower = 0

@@ -1,11 +1,10 @@
 """What the README shows is true."""
 
 import re
-from pathlib import Path
 
 from distfsi.scene import load
+from launch import ROOT
 
-ROOT = Path(__file__).parent.parent
 BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL))
 
 

@@ -19,9 +19,9 @@ from distfsi.resources import works
 from distfsi.run import gpu_of_rank, run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
-from launch import ROOT
+from launch import ROOT, SUPPORT
 
-SCRIPT = ROOT / "tests/mpi_gpu.py"
+SCRIPT = SUPPORT / "mpi_gpu.py"
 
 
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])

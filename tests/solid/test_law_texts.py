@@ -2,6 +2,12 @@
 
 import numpy as np
 import pytest
+from test_drucker_prager_cap import EOS as SOIL_EOS
+from test_drucker_prager_cap import SOIL
+from test_johnson_holmquist import EOS as GLASS_EOS
+from test_johnson_holmquist import GLASS
+from test_material import HJC, HJC_EOS, STEEL, STEEL_EOS
+from test_zerilli_armstrong import IRON
 
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostRuntime
@@ -17,12 +23,6 @@ from distfsi.laws.solid.strength.linear_hardening import LinearHardening
 from distfsi.laws.solid.strength.none import NoStrength
 from distfsi.laws.solid.strength.perfectly_plastic import PerfectlyPlastic
 from material_point import Points, body_of
-from test_drucker_prager_cap import EOS as SOIL_EOS
-from test_drucker_prager_cap import SOIL
-from test_johnson_holmquist import EOS as GLASS_EOS
-from test_johnson_holmquist import GLASS
-from test_material import HJC, HJC_EOS, STEEL, STEEL_EOS
-from test_zerilli_armstrong import IRON
 
 COPPER_EOS, SCATTER = MieGrueneisen(3940.0, 1.489, 0.1, 0.05, 2.0, 0.47), Scatter(8.0, 1e-3, 1)
 DUCTILE = JohnsonCookFailure(0.05, 0.1, -2.12, 0.002, 0.61, 1.0, 3e9, 1e3, SCATTER)

@@ -8,7 +8,7 @@ import pytest
 from distfsi.mesh import balance
 from distfsi.mesh.curve import deal
 from launch import ROOT, run_ranks
-from test_restart import results
+from results import results
 
 TUBE = ["domain.cells=[64, 64]", "solid.bodies.tube.spacing=0.625 mm", "performance.block_cells=[16, 16]"]
 PROGRAM = """

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import h5py
 import pytest
+from test_output import contents, read_with_vtk, same
 
 import launch
 from distfsi.errors import InputError
@@ -15,9 +16,10 @@ from distfsi.output.directory import held
 from distfsi.output.fields import read_cells, series
 from distfsi.output.history import read_history
 from distfsi.output.storage import storage
-from test_output import OneRank, contents, read_with_vtk, same
+from launch import SUPPORT
+from one_rank import OneRank
 
-SCRIPT = Path(__file__).with_name("mpi_output.py")
+SCRIPT = SUPPORT / "mpi_output.py"
 NOBODY = 65534  # a user without rights
 SOD = (
     "run",
@@ -30,6 +32,8 @@ SOD = (
 LIMITED = """
 import resource, runpy, sys
 from mpi4py import MPI  # starts up with files of its own
+from launch import SUPPORT
+from one_rank import OneRank
 limit = int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 runpy.run_module("distfsi", run_name="__main__")

@@ -8,7 +8,7 @@ import pytest
 
 from distfsi.device.markers import helper
 from distfsi.fluid.kernels import tile as kernels
-from launch import ROOT
+from launch import SUPPORT
 from mpi_rest import SCENES, cells_of, digest, follow, simulation_of
 
 
@@ -102,9 +102,7 @@ def test_blocks_with_covered_cells_are_looked_at():
 )
 def test_rest_on_several_ranks(mpiexec, ranks, names):
     """The same bits, and as much at rest as on one rank."""
-    printed = dict(
-        re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, ROOT / "tests/mpi_rest.py", *names), re.MULTILINE)
-    )
+    printed = dict(re.findall(r"^(.+): (\w+ [\d.]+)$", mpiexec(ranks, SUPPORT / "mpi_rest.py", *names), re.MULTILINE))
     assert printed == {name: f"{digest(computed(name)[0])} {rested(name)[1]:.6f}" for name in names}
 
 

@@ -19,7 +19,7 @@ from distfsi.output.restart import Restart
 from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT
-from test_restart import results
+from results import results
 
 SCENE = ROOT / "inputs" / "gas_piston.toml"
 TINY = ("domain.cells=32", "output.restart_every=1 ns", "output.fields_every=0", "output.history_every=1")

@@ -151,8 +151,8 @@ SEDOV = {"cylindrical": (0.311357, 0.75, 0.04376), "spherical": (0.851072, 1.0, 
 
 @pytest.mark.parametrize("symmetry", SEDOV)
 def test_sedov(symmetry):
-    """As in planar coordinates (tests/test_blasts.py): the radius within 0.5 %, the pressure inside within 5 %, and the
-    density's peak of 6 as high as on 120 cells in two dimensions."""
+    """As in planar coordinates: the radius within 0.5 %, the pressure inside within 5 %, and the density's peak of 6 as
+    high as on 120 cells in two dimensions."""
     energy, radius, central = SEDOV[symmetry]
     size, cells = 1.2 * radius, 200
     quiet = Region(FluidState(0, 1.0, 1e-6, (0.0,)), None)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from test_tubes import TUBES
 
 from distfsi.scene.description import Ball, Box, FluidState, Performance, Region
 from fluids import AIR, TNT, WATER
-from test_tubes import TUBES
 from tubes import PERIODIC, advance, fields, scene_of, start
 
 WALLS = ("wall", "symmetry")

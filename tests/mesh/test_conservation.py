@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from launch import ROOT
+from launch import SUPPORT
 from mpi_conservation import BOXES
 
 NAMES = list(BOXES)
 
 
 def on_ranks(mpiexec, ranks, names):
-    printed = mpiexec(ranks, ROOT / "tests" / "mpi_conservation.py", *names)
+    printed = mpiexec(ranks, SUPPORT / "mpi_conservation.py", *names)
     lines = [json.loads(line) for line in printed.splitlines() if line.startswith("{")]
     return {line.pop("name"): line for line in lines}
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import psutil
 
-ROOT = Path(__file__).parent.parent
+SUPPORT = Path(__file__).parent  # what several tests share, and what they run
+ROOT = SUPPORT.parent.parent
 
 # One compute thread per rank; and what Open MPI needs to start more ranks than cores, or as root.
 ENVIRONMENT = {
