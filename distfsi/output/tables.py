@@ -17,7 +17,7 @@ from distfsi.output.scales import largest, norm_of, scaled
 
 WIDTH, PANEL_HEIGHT, GAP = 10.0, 1.7, 0.65  # inches
 COLUMNS, TIMES = 2, 5
-COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[xyz]{1,2}))?( \[(?P<unit>.*)\])?")
+COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[rxyz]{1,2}))?( \[(?P<unit>.*)\])?")
 
 Curves = dict[str, np.ndarray]
 
@@ -26,7 +26,7 @@ def draw_gauge(name: str, table: Mapping[str, Any]) -> Figure:
     """A panel for each quantity of a gauge's table, components of a vector in one panel."""
     table = dict(table)
     time = table.pop("time [s]")
-    line = [table.pop(f"{axis} [m]") for axis in "xyz" if f"{axis} [m]" in table]
+    line = [table.pop(f"{axis} [m]") for axis in "rxyz" if f"{axis} [m]" in table]
     if line:
         along, unit, groups, labels = _along_line(time, np.stack(line, axis=1), table)
     else:
