@@ -29,6 +29,7 @@ from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.packing import pack
+from distfsi.solid.loads import Loads
 from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
@@ -66,6 +67,7 @@ class Simulation:
     solid: Solid | None
     coupling: Coupling | None
     timers: Timers
+    loads: Loads | None = None
     watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
     derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
@@ -102,7 +104,8 @@ class Simulation:
         if model and fluid and solid:
             coupled = COUPLINGS[scene.coupling.scheme]
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        loads = Loads(scene, solid, device) if scene.loads and isinstance(solid, Solid) else None
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device), loads)
         if fluid and fluid.mapping:
             simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
@@ -147,7 +150,7 @@ class Simulation:
         find_forces(solid, coupling, self.timers)
         planned = self.time_step()
         self._refuse_short(planned)
-        return make_step(fluid, solid, coupling, planned, self.timers)
+        return make_step(fluid, solid, coupling, self.loads, planned, self.timers)
 
     def _refuse_short(self, planned: TimeStep) -> None:
         """Collective. Raise StepTooShort where a step is planned that would never get to the end of the run."""

@@ -33,6 +33,7 @@ from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
+from distfsi.scene.load_checks import check_loads
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.schema import (
     CouplingInput,
@@ -79,6 +80,7 @@ def check(
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
         yield from check_obstacles(sections, solid, domain, "fluid" in present)
+        yield from check_loads(sections, domain, solid, "fluid" in present)
         ties = list(check_ties(solid))
         yield from ties or check_solid(solid, domain)
         if fluid is not None:

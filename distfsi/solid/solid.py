@@ -243,6 +243,12 @@ class Solid:
         self._boundary_impulse += sums[:, 2:]
         return excess
 
+    def bear(self, impulse: Any) -> None:
+        """As apply_impulse(), of a load from outside: impulse and work count as given to the solid."""
+        self.apply_impulse(impulse)
+        self._gravity_work += self.work
+        self._boundary_impulse += self.given.sum(axis=1)
+
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
         home = self.exchange.migrate(self.columns, self._home)
@@ -331,11 +337,11 @@ class Solid:
         self.form.label_pieces(self.columns, self.exchange)
 
     def boundary_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
+        """Collective. Impulse (D,) [N s] that symmetry planes, fixed particles, gravity and loads have given so far."""
         return self.blocks.sum(self._boundary_impulse)
 
     def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start."""
+        """Collective. Work [J] of gravity, of loads, and of what moves fixed particles, since the start."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
     def workload(self) -> np.ndarray:

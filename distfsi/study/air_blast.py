@@ -44,18 +44,13 @@ class Blast:
     def of(cls, distance: float, table: Path) -> Blast:
         """From a gauge's table."""
         rows = read_history(table)
-        time, over = rows["time [s]"], rows["overpressure [Pa]"]
+        time, over = (np.asarray(rows[name], dtype=float) for name in ("time [s]", "overpressure [Pa]"))
         top = int(over.argmax())
         start = int(np.flatnonzero(over > ARRIVED * over[top])[0])
         below = np.flatnonzero(over[top:] <= 0.0)
         end = top + int(below[0]) if len(below) else len(over) - 1
-        return cls(
-            distance,
-            time[start],
-            over[top],
-            float(np.trapezoid(over[start : end + 1], time[start : end + 1])),
-            time[end],
-        )
+        impulse = float(np.trapezoid(over[start : end + 1], time[start : end + 1]))
+        return cls(distance, float(time[start]), float(over[top]), impulse, float(time[end]))
 
 
 @dataclass(frozen=True)
