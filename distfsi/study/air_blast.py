@@ -27,6 +27,7 @@ DISTANCES = (0.4, 12.0)  # m/kg^(1/3), of the curves
 NO_AFTERBURN = "fluid.afterburn.law.energy=1"  # J/kg
 HEADER = ("case", "cells", "distance [m]", "arrival [s]", "peak [Pa]", "impulse [Pa s]", "duration [s]")
 NAMES = ("arrival", "peak", "impulse")
+Z_AXIS = "lg Z [m/kg$^{1/3}$]"
 
 
 @dataclass(frozen=True)
@@ -141,8 +142,8 @@ def _study(
         for n in ground:
             measure(GROUND, f"ground {n}", f"{n} x {3 * n // 4} cells", [f"domain.cells=[{n},{3 * n // 4}]"])
         for n in wall:
-            half = n // 2
-            measure(WALL, f"wall {n}", f"{n} x {half} x {half} cells", [f"domain.cells=[{n},{half},{half}]"])
+            across = 3 * n // 5
+            measure(WALL, f"wall {n}", f"{n} x {across} x {across} cells", [f"domain.cells=[{n},{across},{across}]"])
     paths = [_draw_curves(found), *(_draw_wall(n) for n in wall)]
     print("\n".join(map(str, [DIRECTORY / "air_blast.csv", *paths])))
 
@@ -156,20 +157,23 @@ def _line(case: Case, blast: Blast) -> str:
 
 
 def _draw_curves(found: dict[str, list[Blast]]) -> Path:
-    """The spheres' arrival, peak and impulse over Z, as lg, beside the curves."""
+    """The spheres' arrival, peak and impulse over lg Z: as lg beside the curves, and as parts of these."""
     z = np.geomspace(*DISTANCES, 100)
     curves = np.array([SPHERE.expected(float(each)) for each in z])
     runs = {label: table for label, table in found.items() if label.startswith(SPHERE.name)}
-    charts = []
-    titles = ("arrival [s]", "incident overpressure [Pa]", "incident impulse [Pa s]")
-    for number, title in enumerate(titles):
+    absolute, relative = [], []
+    for number, title in enumerate(("arrival [s]", "incident overpressure [Pa]", "incident impulse [Pa s]")):
         lines = [Curve(np.log10(z), np.log10(curves[:, number]), "Kingery and Bulmash")]
-        for (label, table), style in zip(runs.items(), "osx+^v", strict=False):
-            values = [(blast.arrival, blast.peak, blast.impulse)[number] for blast in table]
-            distances = np.log10([blast.distance for blast in table])
-            lines.append(Curve(distances, np.log10(values), f"{label} cells", style))
-        charts.append(Chart(title, "lg Z [m/kg$^{1/3}$]", f"lg {title}", lines))
-    return draw_charts(DIRECTORY / "sphere.png", charts, columns=3)
+        parts = [Curve(np.log10(z), np.ones_like(z), "Kingery and Bulmash")]
+        for (label, table), style in zip(runs.items(), ("o", "s", "x", "+", "^", "v"), strict=False):
+            values = np.array([(blast.arrival, blast.peak, blast.impulse)[number] for blast in table])
+            expected = np.array([SPHERE.expected(blast.distance)[number] for blast in table])
+            at = np.log10([blast.distance for blast in table])
+            lines.append(Curve(at, np.log10(values), f"{label} cells", style))
+            parts.append(Curve(at, values / expected, f"{label} cells", f"{style}-"))
+        absolute.append(Chart(title, Z_AXIS, f"lg {title}", lines))
+        relative.append(Chart(f"{title.partition(' [')[0]} over the curve", Z_AXIS, "", parts))
+    return draw_charts(DIRECTORY / "sphere.png", [*absolute, *relative], columns=3)
 
 
 def _draw_wall(cells: int) -> Path:
@@ -177,7 +181,13 @@ def _draw_wall(cells: int) -> Path:
     directory = DIRECTORY / f"wall_{cells}" / "gauges" / "wall"
     _, fields, (low, high) = read_layer(series(directory, "cells")[-1][1], normal=0)
     pictures = [
-        Picture(f"{name} [{unit}]", fields[key] / size, (low[1], high[1], low[2], high[2]), "inferno", label=unit)
+        Picture(
+            f"{name}, y to the right, z upwards",
+            fields[key] / size,
+            (low[1], high[1], low[2], high[2]),
+            "inferno",
+            label=unit,
+        )
         for name, key, unit, size in (
             ("highest overpressure", "peak_overpressure", "kPa", 1e3),
             ("impulse", "impulse", "Pa s", 1.0),

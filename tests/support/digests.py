@@ -74,7 +74,7 @@ CASES: Mapping[str, Case] = {
     ),
     "surface_burst": Case("surface_burst", settings=("domain.cells=[40, 30]",)),
     "wall_blast": Case(
-        "wall_blast", settings=("domain.cells=[20, 10, 10]", "stages.0.domain.cells=100", "stages.0.time.end=40 us")
+        "wall_blast", settings=("domain.cells=[20, 12, 12]", "stages.0.domain.cells=100", "stages.0.time.end=40 us")
     ),
     "sod float32": Case("sod", settings=SINGLE),
     "sedov float32": Case("sedov", settings=SINGLE),
