@@ -20,6 +20,7 @@ class Sides:
 
     bodies  how many there are: a side is the number of its first body, for an image behind such a plane so many more
     meet    whether there are different sides
+    continued  (bodies,) the axes, as bits, whose symmetry planes a body goes through
     """
 
     def __init__(self, scene: Solid, columns: Columns, exchange: ParticleExchange, communicator: Communicator):
@@ -33,7 +34,7 @@ class Sides:
             close = np.abs(c["position"][:, axis] - plane) < ON_THE_PLANE * spacing[c["body"]]
             touching[c["body"][close], axis] = 1.0
         touching = communicator.maximum(touching.ravel()).reshape(touching.shape)
-        self._continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
+        self.continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
         self._first = np.array(scene.first_tied)
         self.meet = bool(self._first.any() or any(not touching[:, axis].all() for axis, _ in planes))
         self._device = exchange.device
@@ -44,7 +45,7 @@ class Sides:
         """The side (count,) of particles, ghosts and images with these keys."""
         if key is not self._key:
             body = self.body_of(key.host)
-            beyond = key.host % IMAGES & ~self._continued[body] > 0
+            beyond = key.host % IMAGES & ~self.continued[body] > 0
             self._key, self._side = key, DualArray(self._device, self._first[body] + self.bodies * beyond)
         return present(self._side)
 

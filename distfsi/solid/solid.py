@@ -113,7 +113,7 @@ class Solid:
         """Collective. What materials and bonds find before the first step; how particles act on each other, and what
         bodies run into."""
         self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
-        sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
+        self.sides = sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
         given = (scene, self.kernels, self.exchange, self.communicator)
         form, contacts = form_of(*given, self._points, sides), contacts_of(*given, sides)
         form.bind(self.columns, self.exchange)
@@ -222,10 +222,15 @@ class Solid:
             met.heat(c, self.around, dt, around)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
-        self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
+        going = self._going(dt)
+        self._run(self.kernels.move, dt, going, *c.read("position"), moved)
         c.adopt("position", moved)
         self.sub_steps += 1
-        self._run(self.kernels.average_velocity, self.sub_steps, velocity, self.carried)
+        self._run(self.kernels.average_velocity, self.sub_steps, going, self.carried)
+
+    def _going(self, dt: float) -> Any:
+        """The velocity (own, D) [m/s] with which particles go on for `dt` [s]."""
+        return self.columns.read("velocity")[0]
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
@@ -242,6 +247,10 @@ class Solid:
         self._gravity_work += sums[:, 1]
         self._boundary_impulse += sums[:, 2:]
         return excess
+
+    def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
+        """See solid/protocol.py: each particle has shared for itself."""
+        return impulse, shared
 
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
@@ -329,6 +338,10 @@ class Solid:
     def label_pieces(self) -> None:
         """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
         self.form.label_pieces(self.columns, self.exchange)
+
+    def reported(self) -> dict[str, float]:
+        """What the history shows besides totals, by the names of its columns, the same on all ranks."""
+        return {}
 
     def boundary_impulse(self) -> np.ndarray:
         """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
