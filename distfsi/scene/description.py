@@ -388,8 +388,18 @@ class Performance:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a scene comes from: the input file, its text, and the settings that were laid over it."""
+
+    file: str
+    text: str
+    settings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it;
+    `origin`: None for a scene that was made in Python, and for a stage."""
 
     title: str
     domain: Domain
@@ -403,3 +413,4 @@ class Scene:
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
+    origin: Origin | None = field(default=None, compare=False)
