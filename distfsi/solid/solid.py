@@ -25,7 +25,7 @@ from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid import contact, fields, neighbours, pieces, total_lagrangian, updated, walls
+from distfsi.solid import contact, fields, neighbours, open_ends, pieces, total_lagrangian, updated, walls
 from distfsi.solid.contact import Contact
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.interactions import contacts_of, form_of
@@ -34,6 +34,7 @@ from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near
+from distfsi.solid.open_ends import OpenEnds
 from distfsi.solid.packed import packed
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
@@ -52,6 +53,7 @@ DRIVERS = (
     *total_lagrangian.DRIVERS,
     *contact.DRIVERS,
     *walls.DRIVERS,
+    *open_ends.DRIVERS,
 )
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
@@ -88,6 +90,8 @@ class Solid:
         self._points = MaterialGroups(self.materials, device, constants)
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, device, self.kernels)
+        self._open = OpenEnds(self.kernels, device, communicator, scene.domain)
+        self._support = 2.0 * solid.smoothing * max(body.spacing for body in solid.bodies)  # at the start [m]
         # Sums over all steps, and of the last one.
         self._boundary_impulse = np.zeros((blocks.local_count, D))
         self._gravity_work = np.zeros(blocks.local_count)
@@ -149,15 +153,21 @@ class Solid:
 
         `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. `goes_on`: a step that
         has begun goes on with another sub-step; `stray` [m]: how far particles go between two calls of migrate(), if
-        there are such. Raises Diverged on all ranks when a smoothing length is not finite.
+        there are such. What has left the domain is let go before a step. Raises Diverged on all ranks when a smoothing
+        length is not finite.
         """
-        c, device, own = self.columns, self.device, self.count
-        (h,) = c.read("h")
-        largest = self.exchange.rows.largest(h, 0.0)
-        maxima = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
-        support, flags = 2.0 * maxima[0], maxima[1:]
+        c, device = self.columns, self.device
+        passed = np.empty(0, dtype=np.int64)
+        if self._open.there and not goes_on:
+            passed = self._open.passed(c, max(reach, self._support))
+        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
+        maxima = self.communicator.maximum(np.array([largest, len(passed), *self.form.flags(c)]))
+        support, flags = 2.0 * maxima[0] or self._support, maxima[2:]
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
+        if maxima[1]:
+            self._let_go(passed)
+        own = self.count
         state, parity = device.empty((own, VELOCITY + self.dimensions)), ((),) * VELOCITY
         device.run(self.kernels.pack_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
         (now,) = c.read("position")
@@ -246,8 +256,30 @@ class Solid:
     def migrate(self) -> None:
         """Collective. Give the particles that left this rank's blocks to their new owners."""
         home = self.exchange.migrate(self.columns, self._home)
-        if home is self._home:
+        if home is not self._home:
+            self._settle(home)
+
+    def _let_go(self, passed: np.ndarray) -> None:
+        """Collective. Of the rows that have `passed` an end forget those that have left; what they carry has left."""
+        self.label_pieces()
+        left = self._open.left(self.columns, passed)
+        if not len(left):
             return
+        c, gone = self.columns, np.zeros((self.count, 1))
+        gone[left] = 1.0
+        mass, velocity = gone * c["mass"][:, None], c["velocity"]
+        energy = mass * (0.5 * (velocity**2).sum(axis=1, keepdims=True) + c["energy"][:, None])
+        sums = self._per_body(self.device.array(np.hstack([energy, mass * velocity]))).sum(axis=1)
+        self._gravity_work -= sums[:, 0]
+        self._boundary_impulse -= sums[:, 1:]
+        home, stays = present(self._home).host(), np.flatnonzero(gone == 0.0)
+        rows = self.device.array(stays)
+        for name in c:
+            c.adopt(name, self.exchange.rows.taken(*c.read(name), rows))
+        self._settle(DualArray(self.device, home[stays]))
+
+    def _settle(self, home: DualArray) -> None:
+        """Particles have come or gone: `home` (own,) are their blocks now."""
         self._home, bodies = home, self.given.shape[1]
         self._points.select(self.columns["body"])
         self._block = home.host() - self.blocks.first
@@ -307,15 +339,15 @@ class Solid:
         return dict(zip(("mass", "kinetic", "internal", "acoustic"), total, strict=False)) | {"momentum": total[4:]}
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], center of mass (D,) [m], momentum (D,) [N s] of a body, and the impulse (D,) [N s]
-        that the fluid gave to it in the last step."""
+        """Collective. mass [kg], center of mass (D,) [m] (NaN: all of it has left), momentum (D,) [N s] of a body, and
+        the impulse (D,) [N s] that the fluid gave to it in the last step."""
         c, D = self.columns, self.dimensions
         mass = c["mass"][:, None]
         values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
         amounts = self._per_body(self.device.array(values))
         total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
         mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
-        return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
+        return {"mass": mass, "center": first_moment / (mass or np.nan), "momentum": momentum, "impulse": impulse}
 
     def pieces(self) -> dict[str, np.ndarray] | None:
         """Collective. The pieces that intact bonds hold together: see solid/pieces.py; None without bonds."""

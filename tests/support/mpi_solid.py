@@ -116,6 +116,14 @@ def bonded_discs(device):
     return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), device, block_cells=2, form="total_lagrangian"), 80
 
 
+def disc_that_leaves(device, communicator=None):
+    """A bonded disc that goes through an open end while another one, without bonds, begins to."""
+    out = body(d.Ball((0.7, 0.1), 0.2), 0.05, 2000.0, (900.0, 300.0), SOFT_EOS, SOFT)
+    loose = body(d.Ball((0.6, -0.6), 0.2), 0.05, 2000.0, (700.0, 0.0), SOFT_EOS, SOFT, form="updated_lagrangian")
+    given = {"block_cells": 2, "form": "total_lagrangian", "communicator": communicator}
+    return solid([out, loose], (-1.0, -1.0), (1.0, 1.0), (), device, **given), 100
+
+
 def discs_of_two_forms(device):
     """A bonded disc between two of other forms and materials, of which one tears it apart."""
     failure = JohnsonCookFailure(0.1, 0.0, 0.0, 0.0, 0.0, 1.0, None, 0.0, None)
@@ -140,7 +148,7 @@ def bursting_ball(device, communicator=None):
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
-    for case in (colliding_discs, colliding_balls, bonded_discs, discs_of_two_forms, bursting_ball):
+    for case in (colliding_discs, colliding_balls, bonded_discs, discs_of_two_forms, disc_that_leaves, bursting_ball):
         digests = []
         for threads in (1, 2):
             part, steps = case(Cpu(threads))
@@ -155,6 +163,8 @@ def main():
                 debris = part.communicator.concatenate(part.columns["bond_count"] == 0)
                 assert 0 < debris.sum() < len(debris)
                 assert debris.sum() < len(part.pieces()["piece"]) < len(debris)
+            assert (len(after) < len(before)) == (case is disc_that_leaves)
+            before = before[np.isin(before[:, 0], after[:, 0])]
             assert np.any(before[np.argsort(before[:, 0]), 1] != after[np.argsort(after[:, 0]), 1])
             digests.append(digest(part))
         assert digests[0] == digests[1]
