@@ -145,7 +145,7 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
     rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction)
-    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
+    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, given.tied, given.wall_friction)
 
 
 def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:

@@ -361,14 +361,17 @@ def check_gauges(
         if gauge.needs not in present:
             yield Fault((*path, "kind"), f"'{table.kind}' needs a {gauge.needs}")
         elif gauge.needs == "fluid" or solid is not None:
-            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _outside(gauge, domain):
+            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _misplaced(gauge, domain):
                 yield Fault((*path, key), text + (one_of(bodies, getattr(gauge, key)) if key == "body" else ""))
 
 
-def _outside(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
+def _misplaced(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
     for key, position in gauge.positions().items():
         if not all(domain.lower[axis] <= x <= domain.upper[axis] for axis, x in position.items()):
             yield key, "lies outside the domain"
+    for key, (axis, side) in gauge.walls().items():
+        if (kind := domain.boundaries[axis][side]) != "wall":
+            yield key, f"is an end of kind '{kind}'; expected a wall"
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

@@ -112,6 +112,7 @@ class Solid:
         self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
         self.form, self._contacts = self._begin(scene)
+        self._walls = next((met for met in self._contacts if isinstance(met, Walls)), None)
 
     def _begin(self, scene: Scene) -> tuple[SolidForm, Sequence[Contact | Walls]]:
         """Collective. What materials and bonds find before the first step; how particles act on each other, and what
@@ -137,6 +138,7 @@ class Solid:
             "SMOOTHING_RATIO": solid.smoothing,
             "ARTIFICIAL_STRESS": solid.artificial_stress,
             "FRICTION": solid.friction,
+            "WALL_FRICTION": solid.wall_friction,
             "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
 
@@ -160,7 +162,8 @@ class Solid:
         passed = np.empty(0, dtype=np.int64)
         if self._open.there and not goes_on:
             passed = self._open.passed(c, max(reach, self._support))
-        largest = self.exchange.rows.largest(*c.read("h"), 0.0)
+        (h,) = c.read("h")
+        largest = self.exchange.rows.largest(h, 0.0)
         maxima = self.communicator.maximum(np.array([largest, len(passed), *self.form.flags(c)]))
         support, flags = 2.0 * maxima[0] or self._support, maxima[2:]
         if not np.isfinite(support):
@@ -220,6 +223,8 @@ class Solid:
         sums = self._per_body(budget).sum(axis=1)
         self._gravity_work += sums[:, motion.WORK]
         self._boundary_impulse += sums[:, motion.IMPULSE :]
+        if self._walls:
+            self._walls.account(dt, lambda load: self._per_body(load).sum(axis=1))
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
@@ -275,7 +280,7 @@ class Solid:
         home, stays = present(self._home).host(), np.flatnonzero(gone == 0.0)
         rows = self.device.array(stays)
         for name in c:
-            c.adopt(name, self.exchange.rows.taken(*c.read(name), rows))
+            c.adopt(name, self.exchange.rows.taken(c.read(name)[0], rows))
         self._settle(DualArray(self.device, home[stays]))
 
     def _settle(self, home: DualArray) -> None:
@@ -312,6 +317,11 @@ class Solid:
     def _per_body(self, values: Any) -> np.ndarray:
         """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
         return present(self._groups).sums(values).reshape(*self.given.shape[:2], values.shape[1])
+
+    @property
+    def meets_walls(self) -> bool:
+        """Whether the domain has walls that hold the particles."""
+        return self._walls is not None
 
     @property
     def around(self) -> Near:
@@ -363,11 +373,20 @@ class Solid:
         self.form.label_pieces(self.columns, self.exchange)
 
     def boundary_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
+        """Collective. Impulse (D,) [N s] given by symmetry planes, walls, fixed particles and gravity since the start,
+        less the momentum that has left."""
         return self.blocks.sum(self._boundary_impulse)
 
+    def wall_impulse(self) -> np.ndarray:
+        """Collective. Impulse (D, 2, D) [N s] that bodies have given to each wall of the domain since the start: across
+        each axis the low one and the high one; 0 where there is none."""
+        D = self.dimensions
+        total = self.blocks.sum(self._walls.impulse) if self._walls else np.zeros(2 * D * D)
+        return total.reshape(D, 2, D)
+
     def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start."""
+        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start, less the energy that has
+        left."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
     def workload(self) -> np.ndarray:
@@ -377,6 +396,8 @@ class Solid:
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
         sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
+        if self._walls:
+            sums["wall_impulse"] = self._walls.impulse
         return {"particles": self._sorted(*self.columns), "sums": sums}
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -388,6 +409,8 @@ class Solid:
         self.form.resume()
         self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]
+        if self._walls:
+            self._walls.impulse[:] = snapshot["sums"]["wall_impulse"]
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """This rank's particles for a field file (solid/fields.py); `chosen`: the rows wanted, by default all, by

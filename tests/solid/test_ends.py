@@ -1,11 +1,17 @@
-"""Ends of the domain: bodies leave through open ones."""
+"""Ends of the domain: bodies leave through open ones, and rub at walls, which measure what they do."""
 
 import numpy as np
 import pytest
 
+from distfsi.errors import InputError
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
+from distfsi.mesh.communicator import Communicator
+from distfsi.output.history import read_history
+from distfsi.run import run
 from distfsi.scene.description import Ball
+from distfsi.scene.loader import load
+from distfsi.simulation import Simulation
 from mpi_solid import body, solid, step
 
 FORMS = ("total_lagrangian", "updated_lagrangian")
@@ -49,3 +55,67 @@ def test_what_hangs_on_stays():
         farthest = part.columns["position"][:, 0].max()
     assert farthest - 2.0 * 2.0 * 1.3 * 0.04 > 1.0
     assert part.count == count
+
+
+# ---- walls -----------------------------------------------------------------------------------------------------------
+
+BLOCK = """
+domain = { lower = [0, 0], upper = [1, 1], cells = [20, 20], x = ["wall", "wall"], y = ["wall", "wall"] }
+time.end = 0.2
+sources.g = { kind = "gravity", acceleration = [0, -2] }
+gauges.floor = { kind = "wall", side = "y_low" }
+[solid.bodies.b]
+shape = { kind = "box", lower = [0.4, 0], upper = [0.6, 0.2] }
+velocity = [1, 0]
+spacing = 0.025
+density = 10
+eos = { kind = "linear", bulk_modulus = 100 }
+strength = { kind = "elastic", shear_modulus = 50 }
+"""
+
+
+def block_on_a_floor(tmp_path, *settings):
+    path = tmp_path / "block.toml"
+    path.write_text(BLOCK)
+    return load(path, [f"output.directory={tmp_path / 'out'}", *settings])
+
+
+@pytest.mark.parametrize(("friction", "speed"), [(0.0, 1.0), (0.3, 1.0), (0.3, 0.05)], ids=["free", "slides", "stops"])
+def test_a_block_rubs_at_a_wall_as_coulomb_says(tmp_path, friction, speed):
+    """The wall takes exactly what the block has lost, and friction heats it."""
+    scene = block_on_a_floor(tmp_path, f"solid.wall_friction={friction}", f"solid.bodies.b.velocity=[{speed}, 0]")
+    simulation = Simulation.of(scene, Communicator(), 1)
+    solid, before = simulation.solid, simulation.solid.totals()
+    while not simulation.done:
+        simulation.step()
+    after, impulse, mass = solid.totals(), solid.wall_impulse(), 0.04 * 10.0
+    weight = np.array([0.0, -2.0 * mass * simulation.time])
+    assert np.abs(after["momentum"] - before["momentum"] - weight + impulse[1, 0]).max() < 1e-14
+    assert np.abs(impulse[0]).max() == np.abs(impulse[1, 1]).max() == 0.0
+    grown = after["kinetic"] + after["internal"] - before["kinetic"] - solid.gravity_work()
+    assert abs(grown) < 1e-12 * before["kinetic"]
+    if speed < friction * 2.0 * simulation.time:
+        assert abs(after["momentum"][0]) < 0.3 * speed * mass  # it swings above its foot
+    else:
+        assert impulse[1, 0, 0] == pytest.approx(-friction * impulse[1, 0, 1], rel=1e-9)
+
+
+def test_a_gauge_and_the_history_tell_what_a_wall_bears(tmp_path):
+    """Also where a run goes on from its half."""
+    run(block_on_a_floor(tmp_path, "output.history_every=1"), Communicator(), 1)
+    for half in ("time.maximum_steps=40", "time.maximum_steps=1000"):
+        words = (f"output.directory={tmp_path / 'halves'}", "output.history_every=1", half)
+        run(block_on_a_floor(tmp_path, *words), Communicator(), 1, "auto" if half.endswith("1000") else None)
+    gauge, history = (read_history(tmp_path / f"out/{name}.csv") for name in ("gauges/floor", "history"))
+    force, impulse = gauge["force_y [N/m]"], gauge["impulse_y [N s/m]"]
+    assert impulse[1:] == pytest.approx(np.cumsum(force[1:] * np.diff(gauge["time [s]"])), rel=1e-9)
+    assert -impulse[-1] == pytest.approx(2.0 * 0.4 * 0.2, rel=0.1)
+    assert history["walls momentum_y [N s/m]"][-1] == impulse[-1]
+    assert np.abs(history["drift momentum_y"]).max() < 1e-12
+    for name in ("gauges/floor.csv", "history.csv"):
+        assert (tmp_path / "halves" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
+
+
+def test_a_gauge_needs_a_wall(tmp_path):
+    with pytest.raises(InputError, match="gauges.floor.side.*is an end of kind 'outflow'; expected a wall"):
+        block_on_a_floor(tmp_path, 'domain.y=["outflow", "wall"]')

@@ -46,10 +46,15 @@ def solid(
     smoothing=1.3,
     artificial_stress=0.0,
     friction=0.0,
+    walled=(),
+    wall_friction=0.0,
 ):
-    """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
+    """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end,
+    `walled` ones two walls."""
     D, given = len(lower), {"form": form, "artificial_stress": artificial_stress, "friction": friction}
+    given["wall_friction"] = wall_friction
     kinds = tuple(("symmetry" if axis in symmetric else "outflow", "outflow") for axis in range(D))
+    kinds = tuple(("wall", "wall") if axis in walled else ends for axis, ends in enumerate(kinds))
     scene = d.Scene(
         title="test",
         domain=d.Domain(lower, upper, (16,) * D, kinds),
@@ -86,7 +91,7 @@ def digest(part):
     rows = part.communicator.concatenate(rows)
     ids = part.communicator.concatenate(c["id"])
     totals = [part.totals()[name] for name in ("mass", "kinetic", "internal", "momentum")]
-    totals += [part.boundary_impulse(), part.gravity_work()]
+    totals += [part.boundary_impulse(), part.gravity_work(), part.wall_impulse().ravel()]
     totals += [value.ravel() for value in (part.pieces() or {}).values()]
     text = rows[np.argsort(ids)].tobytes() + np.concatenate([np.atleast_1d(t) for t in totals]).tobytes()
     return len(ids), hashlib.sha256(text).hexdigest()
@@ -117,10 +122,11 @@ def bonded_discs(device):
 
 
 def disc_that_leaves(device, communicator=None):
-    """A bonded disc that goes through an open end while another one, without bonds, begins to."""
-    out = body(d.Ball((0.7, 0.1), 0.2), 0.05, 2000.0, (900.0, 300.0), SOFT_EOS, SOFT)
+    """A bonded disc that rubs at a wall and goes through an open end, while another one, without bonds, begins to."""
+    out = body(d.Ball((0.7, 0.75), 0.2), 0.05, 2000.0, (900.0, 300.0), SOFT_EOS, SOFT)
     loose = body(d.Ball((0.6, -0.6), 0.2), 0.05, 2000.0, (700.0, 0.0), SOFT_EOS, SOFT, form="updated_lagrangian")
     given = {"block_cells": 2, "form": "total_lagrangian", "communicator": communicator}
+    given |= {"walled": (1,), "wall_friction": 0.3}
     return solid([out, loose], (-1.0, -1.0), (1.0, 1.0), (), device, **given), 100
 
 
