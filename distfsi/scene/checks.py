@@ -80,7 +80,7 @@ def check(
     if solid is not None:
         yield from check_obstacles(sections, solid, domain, "fluid" in present)
         ties = list(check_ties(solid))
-        yield from ties or check_solid(solid, domain)
+        yield from ties or check_solid(solid, domain, sections.fluid is not None)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
@@ -212,13 +212,13 @@ def check_ties(solid: Solid) -> Iterator[Fault]:
             yield Fault(path, "tied bodies need one form")
 
 
-def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
-    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
+def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form; ends that know them."""
     if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
         yield Fault(("solid", "artificial_stress"), 'bonds cannot clump; it needs form = "updated_lagrangian"')
     for axis, ends in enumerate(domain.boundaries):
-        if "periodic" in ends:
-            yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
+        if "periodic" in ends and in_fluid:
+            yield Fault(("domain", AXES[axis]), "periodic; a scene with bodies in a fluid needs ends of another kind")
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
         path = (*_bodies_of(solid), body.name)

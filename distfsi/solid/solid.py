@@ -36,6 +36,7 @@ from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near
 from distfsi.solid.open_ends import OpenEnds
 from distfsi.solid.packed import packed
+from distfsi.solid.periodic import PeriodicEnds
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
 from distfsi.solid.walls import Walls
@@ -91,6 +92,7 @@ class Solid:
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, device, self.kernels)
         self._open = OpenEnds(self.kernels, device, communicator, scene.domain)
+        self._periodic = PeriodicEnds(self.kernels, device, communicator, scene.domain)
         self._support = 2.0 * solid.smoothing * max(body.spacing for body in solid.bodies)  # at the start [m]
         # Sums over all steps, and of the last one.
         self._boundary_impulse = np.zeros((blocks.local_count, D))
@@ -259,7 +261,11 @@ class Solid:
         return excess
 
     def migrate(self) -> None:
-        """Collective. Give the particles that left this rank's blocks to their new owners."""
+        """Collective. Carry round what is beyond periodic ends, and give the particles that left this rank's blocks to
+        their new owners."""
+        if self._periodic.there and self._periodic.passed(self.columns):
+            self.label_pieces()
+            self._periodic.carry(self.columns)
         home = self.exchange.migrate(self.columns, self._home)
         if home is not self._home:
             self._settle(home)

@@ -1,4 +1,4 @@
-"""Ends of the domain: bodies leave through open ones, and rub at walls, which measure what they do."""
+"""Ends of the domain: bodies leave through open ones, rub at walls, which measure what they do, and go round."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.history import read_history
 from distfsi.run import run
-from distfsi.scene.description import Ball
+from distfsi.scene.description import Ball, Box
 from distfsi.scene.loader import load
 from distfsi.simulation import Simulation
 from mpi_solid import body, solid, step
@@ -119,3 +119,53 @@ def test_a_gauge_and_the_history_tell_what_a_wall_bears(tmp_path):
 def test_a_gauge_needs_a_wall(tmp_path):
     with pytest.raises(InputError, match="gauges.floor.side.*is an end of kind 'outflow'; expected a wall"):
         block_on_a_floor(tmp_path, 'domain.y=["outflow", "wall"]')
+
+
+# ---- periodic ends ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_bodies_meet_across_periodic_ends_as_in_the_middle(form):
+    found = []
+    for x, periodic in ((0.0, ()), (1.0, (0,))):
+        discs = [disc((x - 0.24, 0.1), (0.3, 0.05)), disc((0.24 - x, 0.0), (-0.1, 0.0))]
+        part = solid(discs, (-1.0, -1.0), (1.0, 1.0), form=form, periodic=periodic)
+        before = whole(part)
+        for _ in range(100):
+            step(part)
+        assert np.abs(whole(part) - before).max() < 1e-13 * before[-1]
+        order = np.argsort(part.columns["id"])
+        found.append((part.columns["position"][order] - [x, 0.0], part.columns["velocity"][order]))
+    (here, own), (there, other) = found
+    assert np.abs(own[:, 1]).max() > 0.1
+    assert (np.mod(here[:, 0] - there[:, 0] + 1.0, 2.0) - 1.0) == pytest.approx(0.0, abs=1e-9)
+    assert other == pytest.approx(own, abs=1e-8)
+
+
+def test_a_body_goes_round_as_a_whole():
+    """Once its middle is beyond the end; the way back is as long as the domain."""
+    part, time = solid([disc((0.7, 0.1), (1.0, 0.0))], (-1.0, -1.0), (1.0, 1.0), (), periodic=(0,), form=FORMS[0]), 0.0
+    centers = []
+    while time < 0.6:
+        time += step(part)[0]
+        centers.append(part.body_totals(0)["center"][0])
+    assert max(centers) == pytest.approx(1.0, abs=0.02)
+    assert centers[-1] == pytest.approx(time - 1.3, abs=1e-12)
+    assert part.columns["velocity"] == pytest.approx(np.tile([1.0, 0.0], (part.count, 1)), abs=1e-12)
+    with pytest.raises(InputError, match="would meet what they have met"):
+        solid([disc((0.0, 0.0), (0.0, 0.0))], (-0.2, -1.0), (0.2, 1.0), periodic=(0,)).prepare(0.3)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_plates_without_end_bear_the_stress_of_uniaxial_waves(form):
+    """density x c x closing speed / 2 with the longitudinal c, though Poisson's ratio is 0.3: nothing is free aside."""
+    eos, strength, density, speed = LinearEos(833.3333), Elastic(384.6154), 1000.0, 0.01
+    c, thickness = np.sqrt((833.3333 + 4.0 / 3.0 * 384.6154) / density), 1.0
+    low = body(Box((-0.1, -thickness), (0.1, 0.0)), 0.025, density, (0.0, speed), eos, strength)
+    high = body(Box((-0.1, 5e-5), (0.1, thickness)), 0.025, density, (0.0, 0.0), eos, strength)
+    part, time = solid([low, high], (-0.1, -2.0), (0.1, 2.0), form=form, viscosity=(0.5, 1.0), periodic=(0,)), 0.0
+    while time < 0.6 * thickness / c:
+        time += step(part)[0]
+    y, stress = part.columns["position"][:, 1], part.columns["pressure"] - part.columns["deviator"][:, 1]
+    assert stress[(np.abs(y) > 0.1) & (np.abs(y) < 0.4)].mean() == pytest.approx(0.5 * density * c * speed, rel=0.01)
+    assert np.abs(part.columns["velocity"][:, 0]).max() < 1e-12 * speed
