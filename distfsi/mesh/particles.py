@@ -133,15 +133,8 @@ class ParticleExchange:
         mask, change = self._mirrored(position, known, planes, bonded)
         source, mask = images(mask)
         key = self._known_key(id, np.concatenate([arrived["id"] * IMAGES, known[source] * IMAGES + mask]))
-        return GhostPlan(
-            own,
-            len(key.host),
-            key,
-            self,
-            route,
-            device.array(rows),
-            Images(device, row[source], mask, self._periodic, change[source]),
-        )
+        found = Images(device, row[source], mask, self._periodic, change[source])
+        return GhostPlan(own, len(key.host), key, self, route, device.array(rows), found)
 
     def _border(self, position: Any, reach: float, planes: list[Plane]) -> np.ndarray:
         """The own particles within `reach` of other ranks' blocks, or with images."""
@@ -344,9 +337,9 @@ class GhostPlan:
         device.run(kernels.extend, first, self.own, width, array.reshape(-1), stride, column, packed, flat)
         if parity == "position":
             given = (images.source, images.mask, images.shifted, images.change)
-            device.run(kernels.place_images, images.count, first, width, *given, flat)
+            device.run(kernels.position_images, images.count, first, width, *given, flat)
         elif images.count:
             odd = [sum(1 << axis for axis in set(axes) if axes.count(axis) % 2) for axes in parity]
-            given = (images.source, images.mirrored, device.array(np.array(odd)))
-            device.run(kernels.mirror_values, images.count, first, width, *given, flat)
+            signs = device.array(np.array(odd))
+            device.run(kernels.mirror_values, images.count, first, width, images.source, images.mirrored, signs, flat)
         return extended

@@ -17,7 +17,7 @@ from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
-from distfsi.scene.motion import Motion
+from distfsi.scene.motion import Free, Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -233,6 +233,8 @@ class Body:
     the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
     `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
     cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
+    A body with a `motion` is rigid: an obstacle, which stands or goes as told, or free; its law tells how
+    it meets others.
     """
 
     name: str
@@ -249,14 +251,18 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
-    motion: Motion | None = None
+    motion: Motion | Free | None = None
+
+    @property
+    def path(self) -> tuple[str, str, str]:
+        """Where the input has it."""
+        kind = {Motion: "obstacles", Free: "rigid"}.get(type(self.motion), "bodies")
+        return ("solid", kind, self.name)
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
-
-    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
@@ -272,14 +278,18 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
-    obstacles: bool = False
     friction: float = 0.0
     tied: tuple[tuple[str, ...], ...] = ()
     wall_friction: float = 0.0
 
-    def form_of(self, body: Body) -> SolidForm:
+    def form_of(self, body: Body) -> SolidForm | Literal["rigid"]:
         """The form of a body: its own or that of the solid."""
-        return body.form or self.form
+        return "rigid" if body.motion else body.form or self.form
+
+    @property
+    def obstacles(self) -> bool:
+        """Whether no force moves any of them: they stand, or go as told."""
+        return all(isinstance(body.motion, Motion) for body in self.bodies)
 
     @property
     def first_tied(self) -> tuple[int, ...]:

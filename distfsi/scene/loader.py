@@ -76,9 +76,8 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
     shapes: list[tuple[Path, Shape | None]] = []
     for n, region in enumerate(scene.fluid.regions if scene.fluid else ()):
         shapes.append((("fluid", "regions", n, "shape"), region.shape))
-    kind = "obstacles" if scene.solid and scene.solid.obstacles else "bodies"
     for body in scene.solid.bodies if scene.solid else ():
-        shapes += [(("solid", kind, body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
+        shapes += [((*body.path, key), getattr(body, key)) for key in ("shape", "fixed")]
     for path, shape in shapes:
         for mesh in meshes_in(shape):
             if count := mesh.surface.open_edges:
@@ -151,7 +150,8 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     domain = build.build_domain(sections.domain) if sections.domain else None
     dimensions = domain.dimensions if domain else 1
     fluid = build.build_fluid(sections.fluid, dimensions) if sections.fluid else None
-    solid = build.build_solid(sections.solid, dimensions) if sections.solid else None
+    pressure = max((region.state.pressure for region in fluid.regions), default=0.0) if fluid else 0.0
+    solid = build.build_solid(sections.solid, dimensions, pressure) if sections.solid else None
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))

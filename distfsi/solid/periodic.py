@@ -10,9 +10,6 @@ from distfsi.device.interface import Columns, Device
 from distfsi.mesh.communicator import Communicator
 from distfsi.mesh.rows import Rows
 from distfsi.scene.description import Domain
-from distfsi.solid.kernels import motion
-
-DRIVERS = (motion.mark_beyond,)
 
 
 class PeriodicEnds:
@@ -20,6 +17,7 @@ class PeriodicEnds:
     particles go one by one."""
 
     def __init__(self, kernels: SimpleNamespace, device: Device, communicator: Communicator, domain: Domain):
+        """`kernels` holds the DRIVERS of solid/open_ends.py."""
         self._kernels, self._device, self._communicator = kernels, device, communicator
         self._rows = Rows(device, kernels)
         self._lower, self._upper = np.array(domain.lower), np.array(domain.upper)

@@ -25,7 +25,7 @@ from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid import contact, fields, neighbours, open_ends, pieces, total_lagrangian, updated, walls
+from distfsi.solid import contact, fields, neighbours, open_ends, total_lagrangian, updated, walls
 from distfsi.solid.contact import Contact
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.interactions import contacts_of, form_of
@@ -39,6 +39,7 @@ from distfsi.solid.packed import packed
 from distfsi.solid.periodic import PeriodicEnds
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
+from distfsi.solid.totals import Totals
 from distfsi.solid.walls import Walls
 
 DRIVERS = (
@@ -59,7 +60,7 @@ DRIVERS = (
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
-class Solid:
+class Solid(Totals):
     """All particles of this rank. A step is prepare(), time_step(), advance(dt), apply_impulse(impulse), migrate(); of
     these a sub-step is the first three.
 
@@ -92,6 +93,7 @@ class Solid:
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, device, self.kernels)
         self._open = OpenEnds(self.kernels, device, communicator, scene.domain)
+        self._rigid = np.array([body.motion is not None for body in solid.bodies])
         self._periodic = PeriodicEnds(self.kernels, device, communicator, scene.domain)
         self._support = 2.0 * solid.smoothing * max(body.spacing for body in solid.bodies)  # at the start [m]
         # Sums over all steps, and of the last one.
@@ -120,7 +122,7 @@ class Solid:
         """Collective. What materials and bonds find before the first step; how particles act on each other, and what
         bodies run into."""
         self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
-        sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
+        self.sides = sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
         given = (scene, self.kernels, self.exchange, self.communicator)
         form, contacts = form_of(*given, self._points, sides), contacts_of(*given, sides)
         form.bind(self.columns, self.exchange)
@@ -164,6 +166,7 @@ class Solid:
         passed = np.empty(0, dtype=np.int64)
         if self._open.there and not goes_on:
             passed = self._open.passed(c, max(reach, self._support))
+            passed = passed[~self._rigid[c["body"][passed]]]  # these go on: all of a body, or nothing, moves
         (h,) = c.read("h")
         largest = self.exchange.rows.largest(h, 0.0)
         maxima = self.communicator.maximum(np.array([largest, len(passed), *self.form.flags(c)]))
@@ -239,10 +242,15 @@ class Solid:
             met.heat(c, self.around, dt, around)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
-        self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
+        going = self._going(dt)
+        self._run(self.kernels.move, dt, going, *c.read("position"), moved)
         c.adopt("position", moved)
         self.sub_steps += 1
-        self._run(self.kernels.average_velocity, self.sub_steps, velocity, self.carried)
+        self._run(self.kernels.average_velocity, self.sub_steps, going, self.carried)
+
+    def _going(self, dt: float) -> Any:
+        """The velocity (own, D) [m/s] with which particles go on for `dt` [s]."""
+        return self.columns.read("velocity")[0]
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
@@ -259,6 +267,10 @@ class Solid:
         self._gravity_work += sums[:, 1]
         self._boundary_impulse += sums[:, 2:]
         return excess
+
+    def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
+        """See solid/protocol.py: each particle has shared for itself."""
+        return impulse, shared
 
     def migrate(self) -> None:
         """Collective. Carry round what is beyond periodic ends, and give the particles that left this rank's blocks to
@@ -306,28 +318,10 @@ class Solid:
         if shown:
             self._shown.append(name)
 
-    def _sorted(self, *names: str) -> dict[str, np.ndarray]:
-        """The columns of these names by (block, body, id), an order that depends on nothing else."""
-        return {name: self.columns[name][self._order] for name in names}
-
     def _run(self, kernel: Any, *arguments: Any) -> None:
         self.device.run(kernel, self.count, *arguments)
 
-    # ---- totals and output ------------------------------------------------------------------------------------------
-
-    @property
-    def count(self) -> int:
-        """Number of this rank's particles."""
-        return self.columns.read("id")[0].shape[0]
-
-    def _per_body(self, values: Any) -> np.ndarray:
-        """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
-        return present(self._groups).sums(values).reshape(*self.given.shape[:2], values.shape[1])
-
-    @property
-    def meets_walls(self) -> bool:
-        """Whether the domain has walls that hold the particles."""
-        return self._walls is not None
+    # ---- state and output -------------------------------------------------------------------------------------------
 
     @property
     def around(self) -> Near:
@@ -342,62 +336,6 @@ class Solid:
         if len(broken):
             state = ", ".join(f"{name} {c[name][broken[0]]}" for name in names)
             raise Diverged(f"{self._name(broken[0])} has no valid state at t = {time:.6g} s: {state}")
-
-    def totals(self) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks;
-        acoustic [N s]: their momentum at the speed of sound."""
-        c = self.columns
-        mass, velocity = c["mass"], c["velocity"]
-        kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
-        sums = (mass, kinetic, mass * c["energy"], mass * c["sound_speed"])
-        values = np.column_stack([*sums, mass[:, None] * velocity])
-        total = self.blocks.sum(self._per_body(self.device.array(values)).sum(axis=1))
-        return dict(zip(("mass", "kinetic", "internal", "acoustic"), total, strict=False)) | {"momentum": total[4:]}
-
-    def body_totals(self, body: int) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], center of mass (D,) [m] (NaN: all of it has left), momentum (D,) [N s] of a body, and
-        the impulse (D,) [N s] that the fluid gave to it in the last step."""
-        c, D = self.columns, self.dimensions
-        mass = c["mass"][:, None]
-        values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
-        amounts = self._per_body(self.device.array(values))
-        total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
-        mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
-        return {"mass": mass, "center": first_moment / (mass or np.nan), "momentum": momentum, "impulse": impulse}
-
-    def pieces(self) -> dict[str, np.ndarray] | None:
-        """Collective. The pieces that intact bonds hold together: see solid/pieces.py; None without bonds."""
-        self.label_pieces()
-        if "piece" not in self.columns:
-            return None
-        c, bonded = self._sorted("piece", "mass", "position", "velocity"), self.columns["piece"][self._order] >= 0
-        c = {name: column[bonded] for name, column in c.items()}
-        return pieces.table(c, self._block[self._order][bonded], self.blocks)
-
-    def label_pieces(self) -> None:
-        """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
-        self.form.label_pieces(self.columns, self.exchange)
-
-    def boundary_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D,) [N s] given by symmetry planes, walls, fixed particles and gravity since the start,
-        less the momentum that has left."""
-        return self.blocks.sum(self._boundary_impulse)
-
-    def wall_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D, 2, D) [N s] that bodies have given to each wall of the domain since the start: across
-        each axis the low one and the high one; 0 where there is none."""
-        D = self.dimensions
-        total = self.blocks.sum(self._walls.impulse) if self._walls else np.zeros(2 * D * D)
-        return total.reshape(D, 2, D)
-
-    def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start, less the energy that has
-        left."""
-        return self.blocks.sum(self._gravity_work[:, None])[0]
-
-    def workload(self) -> np.ndarray:
-        """(local blocks,) particles."""
-        return np.bincount(self._block, minlength=self.blocks.local_count).astype(float)
 
     def snapshot(self) -> Snapshot:
         """What a restart needs."""

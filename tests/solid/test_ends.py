@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from distfsi.run import run
 
 from distfsi.errors import InputError
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene.description import Ball, Box
 from distfsi.scene.loader import load
 from distfsi.simulation import Simulation
@@ -169,3 +169,15 @@ def test_plates_without_end_bear_the_stress_of_uniaxial_waves(form):
     y, stress = part.columns["position"][:, 1], part.columns["pressure"] - part.columns["deviator"][:, 1]
     assert stress[(np.abs(y) > 0.1) & (np.abs(y) < 0.4)].mean() == pytest.approx(0.5 * density * c * speed, rel=0.01)
     assert np.abs(part.columns["velocity"][:, 0]).max() < 1e-12 * speed
+
+
+def test_rigid_bodies_go_on_and_periodic_ends_refuse_them(tmp_path):
+    """Beside a body that leaves; and a rigid block rubs at a wall as one that deforms."""
+    rigid = 'solid.rigid.r={shape={kind="box", lower=[0.1, 0.4], upper=[0.3, 0.6]}, spacing=0.05, density=10}'
+    simulation = Simulation.of(
+        block_on_a_floor(tmp_path, rigid, 'domain.x=["wall", "outflow"]', 'domain.y=["outflow", "outflow"]',
+                         "sources=none", "gauges=none", "time.end=1", "solid.bodies.b.velocity=[2, 0]"), Communicator(), 1)
+    before = simulation.solid.body_totals(0)["mass"]
+    while not simulation.done:
+        simulation.step()
+    print(before, simulation.solid.count)

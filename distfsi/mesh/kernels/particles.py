@@ -64,7 +64,7 @@ def mirror_values(begin, end, first, width, source, mask, parity, values):
 
 
 @driver
-def place_images(begin, end, first, width, source, mask, shifted, plane, values):
+def position_images(begin, end, first, width, source, mask, shifted, plane, values):
     """As mirror_values(), of positions: `plane` (images, width) holds the positions of the mirrors or, for the axes in
     the bits of `shifted`, how far images are aside."""
     for m in range(begin, end):
@@ -79,7 +79,7 @@ EXCHANGE = (
     find_moved,
     find_border,
     mirror_values,
-    place_images,
+    position_images,
     count_marked,
     list_marked,
     take_rows,
