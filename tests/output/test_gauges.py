@@ -13,11 +13,11 @@ from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.diagnostics.schlieren import schlieren
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.gauges import Gauge, TableProbe, each_step
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.law_tables import table_of
 from distfsi.simulation import Simulation

@@ -7,10 +7,10 @@ import sys
 import h5py
 import numpy as np
 
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT
 

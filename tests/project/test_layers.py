@@ -17,7 +17,7 @@ LAYERS = (
     {"commands"},
     {"study"},
     {"resources"},
-    {"run"},
+    {"execution"},
     {"simulation", "direct", "memory"},
     {"step", "diagnostics"},
     {"coupling"},
@@ -143,6 +143,6 @@ def test_the_top_of_the_repository_holds_what_the_architecture_says():
 
 def test_a_run_starts_without_what_it_may_not_need():
     """Each takes a third of a second: pictures are drawn at the end, and few scenes need an equation solved."""
-    program = "import sys, distfsi.run; print(*{'matplotlib', 'scipy', 'vtk', 'cupy'} & set(sys.modules))"
+    program = "import sys, distfsi.execution; print(*{'matplotlib', 'scipy', 'vtk', 'cupy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, cwd=ROOT)
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
