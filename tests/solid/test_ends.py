@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from distfsi.run import run
 
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator
@@ -74,9 +74,9 @@ strength = { kind = "elastic", shear_modulus = 50 }
 """
 
 
-def block_on_a_floor(tmp_path, *settings):
+def block_on_a_floor(tmp_path, *settings, text=BLOCK):
     path = tmp_path / "block.toml"
-    path.write_text(BLOCK)
+    path.write_text(text)
     return load(path, [f"output.directory={tmp_path / 'out'}", *settings])
 
 
@@ -171,13 +171,33 @@ def test_plates_without_end_bear_the_stress_of_uniaxial_waves(form):
     assert np.abs(part.columns["velocity"][:, 0]).max() < 1e-12 * speed
 
 
-def test_rigid_bodies_go_on_and_periodic_ends_refuse_them(tmp_path):
-    """Beside a body that leaves; and a rigid block rubs at a wall as one that deforms."""
-    rigid = 'solid.rigid.r={shape={kind="box", lower=[0.1, 0.4], upper=[0.3, 0.6]}, spacing=0.05, density=10}'
-    simulation = Simulation.of(
-        block_on_a_floor(tmp_path, rigid, 'domain.x=["wall", "outflow"]', 'domain.y=["outflow", "outflow"]',
-                         "sources=none", "gauges=none", "time.end=1", "solid.bodies.b.velocity=[2, 0]"), Communicator(), 1)
-    before = simulation.solid.body_totals(0)["mass"]
+# ---- rigid bodies ----------------------------------------------------------------------------------------------------
+
+RIGID = """
+[solid.rigid.r]
+shape = { kind = "box", lower = [0.1, 0], upper = [0.3, 0.2] }
+spacing = 0.05
+density = 10
+velocity = [2, 0]
+"""
+
+
+def test_a_rigid_block_rubs_at_a_wall_and_is_computed_beyond_an_open_end(tmp_path):
+    """Beside a block that deforms, and leaves."""
+    faster = ("solid.bodies.b.velocity=[3, 0]", "time.end=0.5")
+    scene = ('domain.x=["outflow", "outflow"]', "solid.wall_friction=0.3", *faster)
+    simulation = Simulation.of(block_on_a_floor(tmp_path, *scene, text=BLOCK + RIGID), Communicator(), 1)
+    solid, before = simulation.solid, whole(simulation.solid)
     while not simulation.done:
         simulation.step()
-    print(before, simulation.solid.count)
+    soft, rigid = (solid.body_totals(b) for b in (0, 1))
+    assert soft["mass"] == 0.0 and rigid["mass"] == pytest.approx(0.4)
+    assert rigid["center"][0] > 1.0
+    assert np.abs(whole(solid) - before).max() < 1e-12 * before[-1]
+    lost = 0.8 - rigid["momentum"][0]
+    assert lost == pytest.approx(0.3 * (2.0 * 0.4 * 0.5 + rigid["momentum"][1]), rel=1e-9)
+
+
+def test_periodic_ends_refuse_rigid_bodies(tmp_path):
+    with pytest.raises(InputError, match="domain.x.*periodic; a scene with rigid parts needs ends of another kind"):
+        block_on_a_floor(tmp_path, 'domain.x=["periodic", "periodic"]', text=BLOCK + RIGID)
