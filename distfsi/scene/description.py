@@ -266,7 +266,8 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
+    `friction`: Coulomb's coefficient between bodies; `wall_friction`: at walls of the domain. `tied`: names of bodies
+    that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -279,6 +280,7 @@ class Solid:
     artificial_stress: float = 0.0
     friction: float = 0.0
     tied: tuple[tuple[str, ...], ...] = ()
+    wall_friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm | Literal["rigid"]:
         """The form of a body: its own or that of the solid."""

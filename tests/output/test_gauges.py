@@ -383,8 +383,8 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
         (
             ["gauges.a={kind='pont', position=0}"],
-            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'particle', 'plane', 'line'; "
-            "did you mean 'point'?",
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'wall', 'particle', 'plane', "
+            "'line'; did you mean 'point'?",
         ),
         (
             ["gauges.a={kind='point', position=0.5, evry=1}"],
