@@ -18,7 +18,7 @@ LAYERS = (
     {"commands"},
     {"study"},
     {"resources"},
-    {"execution"},
+    {"execution", "sweep"},
     {"simulation", "direct", "memory", "results"},
     {"step", "diagnostics"},
     {"coupling"},
