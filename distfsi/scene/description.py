@@ -378,8 +378,18 @@ class Performance:
 
 
 @dataclass(frozen=True)
+class InputFile:
+    """What a scene was read from: the path of the file, its text, and the settings ("key=value") laid over it."""
+
+    path: str
+    text: str
+    settings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it;
+    `input`: what it was read from, None for a stage."""
 
     title: str
     domain: Domain
@@ -393,3 +403,12 @@ class Scene:
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
+    input: InputFile | None = field(default=None, compare=False)
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        """[Pa] that overpressure counts from; None where it is another at each place, or without a fluid."""
+        if self.fluid is None or self.fluid.hydrostatic_level is not None:
+            return None
+        peaks = self.output.peaks
+        return peaks.ambient_pressure if peaks else self.fluid.regions[0].state.pressure

@@ -15,7 +15,7 @@ from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.coordinate_checks import check_map_is_there
-from distfsi.scene.description import Scene, Shape
+from distfsi.scene.description import InputFile, Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
@@ -33,8 +33,14 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
 
     Raises InputError with one line per fault: file, key, line, what was given, what was expected.
     """
+    return load_text(_read(File(path)), path, overrides)
+
+
+def load_text(text: str, path: str | File, overrides: Sequence[str] = ()) -> Scene:
+    """The scene of the `text` of an input, as if it were in the file at `path`, with `overrides` laid over it. Raises
+    as `load` does."""
     file = File(path)
-    text, data = _read(file)
+    data = _tables(text, file)
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
@@ -55,7 +61,8 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     if faults or scene is None:
         raise InputError(locations.tell(faults))
     noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
-    return replace(scene, notes=noted, stages=tuple(stages))
+    read = InputFile(str(file.absolute()), text, tuple(overrides))
+    return replace(scene, notes=noted, stages=tuple(stages), input=read)
 
 
 def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
@@ -86,8 +93,8 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
                 yield Fault(path, f"{text}; what it winds around by more than a half is inside")
 
 
-def _read(file: File) -> tuple[str, dict[str, Any]]:
-    """Text and tables of a file. A mark of the byte order at its beginning, as some editors leave it, is no text."""
+def _read(file: File) -> str:
+    """Text of a file. A mark of the byte order at its beginning, as some editors leave it, is no text."""
     try:
         with file.open("rb") as opened:
             content = opened.read(LARGEST_FILE + 1)
@@ -98,11 +105,14 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
     if len(content) > LARGEST_FILE:
         raise InputError([f"{file}: is larger than {LARGEST_FILE / 1e6:.0f} MB"])
     try:
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise InputError([f"{file}: is no UTF-8 text"]) from error
+
+
+def _tables(text: str, file: File) -> dict[str, Any]:
     try:
-        return text, tomllib.loads(text)
+        return tomllib.loads(text)
     except ValueError as error:  # of tomllib, or of a number of thousands of digits
         cause = error if isinstance(error, tomllib.TOMLDecodeError) else "a number has too many digits"
         raise InputError([f"{file}: is no TOML: {cause}"]) from error
