@@ -44,8 +44,8 @@ class Journal:
             "phases": [phase.name for phase in scene.fluid.phases] if scene.fluid else [],
             "gauges": {name: gauge.location(scene.domain.coordinates.axes) for name, gauge in scene.gauges.items()},
         }
-        if scene.input:
-            self._notes["input"] = asdict(scene.input)
+        if scene.origin:
+            self._notes["input"] = asdict(scene.origin)
 
     def __enter__(self) -> Journal:
         self._write()

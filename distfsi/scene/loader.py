@@ -15,7 +15,7 @@ from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.coordinate_checks import check_map_is_there
-from distfsi.scene.description import InputFile, Scene, Shape
+from distfsi.scene.description import Origin, Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
@@ -33,14 +33,18 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
 
     Raises InputError with one line per fault: file, key, line, what was given, what was expected.
     """
-    return load_text(_read(File(path)), path, overrides)
-
-
-def load_text(text: str, path: str | File, overrides: Sequence[str] = ()) -> Scene:
-    """The scene of the `text` of an input, as if it were in the file at `path`, with `overrides` laid over it. Raises
-    as `load` does."""
     file = File(path)
-    data = _tables(text, file)
+    return _scene(file, *_read(file), overrides)
+
+
+def scene_again(origin: Origin) -> Scene:
+    """A scene from where it came from, even if the file is there no more. Raises InputError."""
+    file = File(origin.file)
+    return _scene(file, origin.text, _tables(file, origin.text), origin.settings)
+
+
+def _scene(file: File, text: str, data: dict[str, Any], overrides: Sequence[str]) -> Scene:
+    """The scene of a file with this `text`, which holds `data`."""
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
@@ -61,8 +65,8 @@ def load_text(text: str, path: str | File, overrides: Sequence[str] = ()) -> Sce
     if faults or scene is None:
         raise InputError(locations.tell(faults))
     noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
-    read = InputFile(str(file.absolute()), text, tuple(overrides))
-    return replace(scene, notes=noted, stages=tuple(stages), input=read)
+    origin = Origin(str(file.absolute()), text, tuple(overrides))
+    return replace(scene, notes=noted, stages=tuple(stages), origin=origin)
 
 
 def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
@@ -83,9 +87,8 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
     shapes: list[tuple[Path, Shape | None]] = []
     for n, region in enumerate(scene.fluid.regions if scene.fluid else ()):
         shapes.append((("fluid", "regions", n, "shape"), region.shape))
-    kind = "obstacles" if scene.solid and scene.solid.obstacles else "bodies"
     for body in scene.solid.bodies if scene.solid else ():
-        shapes += [(("solid", kind, body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
+        shapes += [((*body.path, key), getattr(body, key)) for key in ("shape", "fixed")]
     for path, shape in shapes:
         for mesh in meshes_in(shape):
             if count := mesh.surface.open_edges:
@@ -93,8 +96,8 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
                 yield Fault(path, f"{text}; what it winds around by more than a half is inside")
 
 
-def _read(file: File) -> str:
-    """Text of a file. A mark of the byte order at its beginning, as some editors leave it, is no text."""
+def _read(file: File) -> tuple[str, dict[str, Any]]:
+    """Text and tables of a file. A mark of the byte order at its beginning, as some editors leave it, is no text."""
     try:
         with file.open("rb") as opened:
             content = opened.read(LARGEST_FILE + 1)
@@ -105,12 +108,14 @@ def _read(file: File) -> str:
     if len(content) > LARGEST_FILE:
         raise InputError([f"{file}: is larger than {LARGEST_FILE / 1e6:.0f} MB"])
     try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise InputError([f"{file}: is no UTF-8 text"]) from error
+    return text, _tables(file, text)
 
 
-def _tables(text: str, file: File) -> dict[str, Any]:
+def _tables(file: File, text: str) -> dict[str, Any]:
+    """Tables of the text of a file."""
     try:
         return tomllib.loads(text)
     except ValueError as error:  # of tomllib, or of a number of thousands of digits
@@ -161,7 +166,8 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     domain = build.build_domain(sections.domain) if sections.domain else None
     dimensions = domain.dimensions if domain else 1
     fluid = build.build_fluid(sections.fluid, dimensions) if sections.fluid else None
-    solid = build.build_solid(sections.solid, dimensions) if sections.solid else None
+    pressure = max((region.state.pressure for region in fluid.regions), default=0.0) if fluid else 0.0
+    solid = build.build_solid(sections.solid, dimensions, pressure) if sections.solid else None
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))

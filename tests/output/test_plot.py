@@ -15,6 +15,7 @@ from PIL import Image
 
 from distfsi.commands.line import main
 from distfsi.errors import Diverged, InputError
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import fields, frames
 from distfsi.output.fields import read_cells, read_layer, series
@@ -24,7 +25,6 @@ from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
 from distfsi.output.tables import draw_blasts, draw_gauge
 from distfsi.output.timeline import draw_history, verdict
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT
 
