@@ -55,6 +55,10 @@ class Gauge(Law):
         """Keys of positions in the fluid, each with its coordinate [m] by axis."""
         return {}
 
+    def walls(self) -> Mapping[str, tuple[int, int]]:
+        """Keys of ends of the domain that must be walls, each with axis and side (0: low, 1: high)."""
+        return {}
+
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Keys whose values do not fit into a scene, each with what is wrong with it."""
         yield from ()
@@ -121,6 +125,9 @@ class Particles(Protocol):
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
         """Collective. mass [kg], center of mass, momentum of a body, and the fluid's impulse on it in the last step."""
+
+    def wall_impulse(self) -> np.ndarray:
+        """Collective. Impulse (D, 2, D) [N s] that bodies have given to each wall of the domain, by axis and side."""
 
 
 class Run(Protocol):

@@ -6,6 +6,7 @@ import json
 import time as clock
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,8 @@ class Journal:
             "started": clock.strftime("%Y-%m-%d %H:%M:%S"),
             "status": "running",
         }
+        if scene.origin:
+            self._notes["input"] = asdict(scene.origin)
 
     def __enter__(self) -> Journal:
         self._write()

@@ -151,7 +151,7 @@ def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> 
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
     rest = (given.zero_energy, given.artificial_stress, given.friction)
-    return Solid(bodies + rigid + obstacles, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
+    return Solid(bodies + rigid + obstacles, given.smoothing, *viscosity, *form, *rest, given.tied, given.wall_friction)
 
 
 def _modulus(body: Body) -> float:

@@ -81,7 +81,7 @@ def check(
         yield from check_rigid(sections, solid, domain, "fluid" in present)
         yield from check_bars(solid, domain)
         ties = list(check_ties(solid))
-        yield from ties or check_solid(solid, domain)
+        yield from ties or check_solid(solid, domain, sections.fluid is not None)
         if fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
@@ -179,13 +179,14 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
 
 
-def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
-    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
+def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form; ends that know them."""
     if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
         yield Fault(("solid", "artificial_stress"), 'bonds cannot clump; it needs form = "updated_lagrangian"')
     for axis, ends in enumerate(domain.boundaries):
-        if "periodic" in ends:
-            yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
+        if "periodic" in ends and (in_fluid or any(body.motion for body in solid.bodies)):
+            which = "bodies in a fluid" if in_fluid else "rigid parts"
+            yield Fault(("domain", AXES[axis]), f"periodic; a scene with {which} needs ends of another kind")
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
         path = body.path
@@ -323,14 +324,17 @@ def check_gauges(
         if gauge.needs not in present:
             yield Fault((*path, "kind"), f"'{table.kind}' needs a {gauge.needs}")
         elif gauge.needs == "fluid" or solid is not None:
-            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _outside(gauge, domain):
+            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _misplaced(gauge, domain):
                 yield Fault((*path, key), text + (one_of(bodies, getattr(gauge, key)) if key == "body" else ""))
 
 
-def _outside(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
+def _misplaced(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
     for key, position in gauge.positions().items():
         if not all(domain.lower[axis] <= x <= domain.upper[axis] for axis, x in position.items()):
             yield key, "lies outside the domain"
+    for key, (axis, side) in gauge.walls().items():
+        if (kind := domain.boundaries[axis][side]) != "wall":
+            yield key, f"is an end of kind '{kind}'; expected a wall"
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

@@ -268,7 +268,8 @@ class Solid:
 
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
+    `friction`: Coulomb's coefficient between bodies; `wall_friction`: at walls of the domain. `tied`: names of bodies
+    that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -281,6 +282,7 @@ class Solid:
     artificial_stress: float = 0.0
     friction: float = 0.0
     tied: tuple[tuple[str, ...], ...] = ()
+    wall_friction: float = 0.0
 
     def form_of(self, body: Body) -> SolidForm | Literal["rigid"]:
         """The form of a body: its own or that of the solid."""
@@ -390,8 +392,18 @@ class Performance:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a scene comes from: the input file, its text, and the settings that were laid over it."""
+
+    file: str
+    text: str
+    settings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it;
+    `origin`: None for a scene that was made in Python, and for a stage."""
 
     title: str
     domain: Domain
@@ -405,3 +417,4 @@ class Scene:
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
+    origin: Origin | None = field(default=None, compare=False)

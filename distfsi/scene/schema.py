@@ -235,6 +235,9 @@ class SolidInput(Table):
         "away, against clumping; 0.3 is usual, 0 is none",
     )
     friction: quantity("1", ge=0.0, le=2.0) = Field(0.0, description="Coulomb's coefficient between bodies that meet")
+    wall_friction: quantity("1", ge=0.0, le=2.0) = Field(
+        0.0, description="Coulomb's coefficient between bodies and walls of the domain"
+    )
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

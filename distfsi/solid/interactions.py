@@ -45,8 +45,9 @@ def contacts_of(
 ) -> list[Contact | Walls]:
     """What bodies run into: other sides, and walls of the domain."""
     domain, device = scene.domain, exchange.device
-    walled = any("wall" in ends for ends in domain.boundaries)
-    walls: list[Contact | Walls] = [Walls(kernels, device, domain)] if walled else []
+    walls: list[Contact | Walls] = []
+    if any("wall" in ends for ends in domain.boundaries):
+        walls = [Walls(kernels, device, exchange.rows, domain, exchange.blocks.local_count)]
     if not sides.meet:
         return walls
     cells = CellSort(kernels, device, domain.lower, domain.upper)

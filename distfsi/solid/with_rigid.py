@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from distfsi.device.interface import DualArray
 from distfsi.gauges import AXES, per_extent
 from distfsi.mesh.blocks import Snapshot
 from distfsi.narrowing import present
@@ -204,15 +205,12 @@ class SolidWithRigid(Solid):
         self._boundary_impulse -= sums[:, :, 1:].sum(axis=1)
         return excess
 
-    def migrate(self) -> None:
-        """Collective. Give the particles that left this rank's blocks to their new owners."""
-        home = self._home
-        super().migrate()
-        if self._home is not home:
-            body = self.columns["body"]
-            self._rows = [np.flatnonzero(body == b) for b in range(self.given.shape[1])]
-            rigid = [b for b, each in enumerate(self._scene.bodies) if each.motion]
-            self._rigid_rows = np.flatnonzero(np.isin(body, rigid))
+    def _settle(self, home: DualArray) -> None:
+        """As of any solid; where the points of each body are."""
+        super()._settle(home)
+        body = self.columns["body"]
+        self._rows = [np.flatnonzero(body == b) for b in range(self.given.shape[1])]
+        self._rigid_rows = np.flatnonzero(self._rigid[body])
 
     # ---- sums over bodies -------------------------------------------------------------------------------------------
 
@@ -260,9 +258,9 @@ class SolidWithRigid(Solid):
         return found
 
     def reported(self) -> dict[str, float]:
-        """Collective. Place, velocity and angle of the free bodies, and the fluid's mean force in the last step."""
-        D = self.dimensions
-        found: dict[str, float] = {}
+        """Collective. As of any solid; place, velocity and angle of the free bodies, and the fluid's mean force in the
+        last step."""
+        D, found = self.dimensions, super().reported()
         newton = per_extent("N", D)
         forces = self.blocks.sum(self.given.reshape(len(self.given), -1)).reshape(self.given.shape[1:])
         forces = forces / self._elapsed if self._elapsed > 0.0 else np.zeros_like(forces)

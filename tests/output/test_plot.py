@@ -14,6 +14,7 @@ from PIL import Image
 
 from distfsi.commands.line import main
 from distfsi.errors import Diverged, InputError
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import fields, frames
 from distfsi.output.fields import read_cells, read_layer, series
@@ -21,7 +22,6 @@ from distfsi.output.frames import Film, telling_plane
 from distfsi.output.info import describe
 from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT
 

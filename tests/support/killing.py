@@ -32,8 +32,8 @@ def fork_run(before: int, scene: str, restart: str | None, settings: Sequence[st
     code = 1
     try:
         from distfsi.errors import DistfsiError
+        from distfsi.execution import run
         from distfsi.mesh.communicator import Communicator
-        from distfsi.run import run
         from distfsi.scene import load
 
         description = load(scene, settings)
@@ -75,9 +75,9 @@ def warm_up() -> None:
     import scipy.integrate  # noqa: F401
     from numba.core.registry import cpu_target
 
+    import distfsi.execution
     import distfsi.fluid.initial
     import distfsi.output.picture
-    import distfsi.run
     import distfsi.scene  # noqa: F401
 
     cpu_target.target_context.refresh()
