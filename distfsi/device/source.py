@@ -161,7 +161,7 @@ def _flattener(arguments: Sequence[object]) -> Callable[..., tuple[object, ...]]
 
 
 def _flat_texts(text: str, value: object) -> list[str]:
-    """Expressions of what a value called `text` becomes. The fields of a record may be records, and those of one kind are
+    """Expressions of what a value called `text` becomes. Fields of a record may be records, and those of one kind are
     always alike."""
     if not _is_named_tuple(value):
         return [text]
