@@ -16,7 +16,7 @@ LAYERS = (
     {"__main__"},
     {"api"},
     {"commands"},
-    {"study"},
+    {"study", "report"},
     {"resources"},
     {"execution"},
     {"simulation", "direct", "memory", "results"},
