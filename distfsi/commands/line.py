@@ -20,6 +20,7 @@ from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
+    "sweep",
     "check",
     "compile",
     "plot",

@@ -17,6 +17,7 @@ from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.bars import Bars
 from distfsi.scene.motion import Free, Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
@@ -234,7 +235,7 @@ class Body:
     `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
     cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
     A body with a `motion` is rigid: an obstacle, which stands or goes as told, or free; its law tells how
-    it meets others.
+    it meets others. `bars` that lie in it.
     """
 
     name: str
@@ -252,6 +253,7 @@ class Body:
     lattice_angle: float = 0.0
     form: SolidForm | None = None
     motion: Motion | Free | None = None
+    bars: Bars | None = None
 
     @property
     def path(self) -> tuple[str, str, str]:

@@ -18,7 +18,7 @@ LAYERS = (
     {"commands"},
     {"study", "report"},
     {"resources"},
-    {"execution"},
+    {"execution", "sweep"},
     {"simulation", "direct", "memory", "results"},
     {"step", "diagnostics"},
     {"coupling"},
