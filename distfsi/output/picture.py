@@ -6,11 +6,14 @@ those of the cells. Columns of the history: "time [s]", "time step [s]", "... en
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+from matplotlib.figure import SubFigure
 
 from distfsi.output.frames import Frame, load_frames
 from distfsi.output.history import read_history
@@ -38,26 +41,40 @@ def draw_summary(directory: Path) -> Path:
     in three dimensions. Raises FileNotFoundError when a file is missing.
     """
     directory = Path(directory)
-    frames = load_frames(directory, TIMES)
-    history = read_history(directory / "history.csv")
-    lines = frames[0].dimensions == 1
-    if lines:
-        frames = [frames[0], *frames[1:][-1:]]
-    else:
-        fields, particles = summary_colors(frames)
-        sheet = Sheet(frames[0].aspect, len(fields), len(frames), particles is not None)
-    notes = read_journal(directory)
+    results, history, notes = Overview.of(directory), read_history(directory / "history.csv"), read_journal(directory)
     with matplotlib.rc_context(STYLE):
-        heights = [profiles_height(frames) if lines else sheet.height, HISTORY_HEIGHT]
-        figure, (upper, lower) = headed(WIDTH, heights, title_of(notes, directory), remark(frames, notes))
-        if lines:
-            draw_profiles(upper, frames)
-        else:
-            draw_maps(upper, sheet, frames, fields, particles)
+        heights = [results.height, HISTORY_HEIGHT]
+        figure, (upper, lower) = headed(WIDTH, heights, title_of(notes, directory), remark(results.frames, notes))
+        results.draw(upper)
         draw_history(lower, history, read_gauges(directory))
         path = directory / "summary.png"
         figure.savefig(path, dpi=RESOLUTION)
     return path
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The fields of a run at some times, on a part of a sheet of this `height` [inches]: profiles of a run along a
+    line at the first and the last time, maps of others."""
+
+    frames: Sequence[Frame]
+    height: float
+    draw: Callable[[SubFigure], None]
+
+    @classmethod
+    def of(cls, directory: Path) -> Overview:
+        """Raises FileNotFoundError when there are no field files."""
+        frames = load_frames(directory, TIMES)
+        if frames[0].dimensions == 1:
+            frames = [frames[0], *frames[1:][-1:]]
+            return cls(frames, profiles_height(frames), partial(draw_profiles, frames=frames))
+        fields, particles = summary_colors(frames)
+        sheet = Sheet(frames[0].aspect, len(fields), len(frames), particles is not None)
+        return cls(
+            frames,
+            sheet.height,
+            partial(draw_maps, sheet=sheet, frames=frames, fields=fields, particles=particles),
+        )
 
 
 def title_of(notes: Mapping[str, Any], directory: Path) -> str:

@@ -144,22 +144,28 @@ def _draw_planes(
 
 
 def _draw_peaks(film: Film, folder: Path, label: str, title: str) -> Iterator[Path]:
-    """What the cells remember of a blast at the last time, where they do (output.peaks)."""
+    with matplotlib.rc_context(STYLE):
+        figure = peaks_figure(film, title)
+        if figure is not None:
+            yield _save(figure, folder / f"peaks{label}.png")
+
+
+def peaks_figure(film: Film, title: str) -> Figure | None:
+    """What the cells remember of a blast at the last time; None where they do not (output.peaks)."""
     names = [name for name in PEAKS if name in film.cell_fields]
     if not names:
-        return
+        return None
     (frame,) = film.frames([len(film) - 1], names)
     frame = replace(frame, particles={})
     if frame.dimensions == 1:
-        heights, draw = [profiles_height([frame], names)], lambda body: draw_profiles(body, [frame], names=names)
+        figure, (body,) = headed(WIDTH, [profiles_height([frame], names)], title)
+        draw_profiles(body, [frame], names=names)
     else:
         fields = field_colors([frame], names)
         sheet = Sheet(frame.aspect, len(fields), 1, False, WIDTH)
-        heights, draw = [sheet.height], lambda body: draw_maps(body, sheet, [frame], fields, None)
-    with matplotlib.rc_context(STYLE):
-        figure, (body,) = headed(WIDTH, heights, title, frame.location)
-        draw(body)
-        yield _save(figure, folder / f"peaks{label}.png")
+        figure, (body,) = headed(WIDTH, [sheet.height], title, frame.location)
+        draw_maps(body, sheet, [frame], fields, None)
+    return figure
 
 
 def _field(film: Film, wanted: str | None) -> str | None:
@@ -225,10 +231,10 @@ def _draw_gauges(directory: Path, folder: Path) -> Iterator[Path]:
         for plane in planes:
             name = plane.parent.name
             path = folder / (f"gauge-{name}-maps.png" if name in tables else f"gauge-{name}.png")
-            yield _save(_draw_layer(plane.parent, name, locations.get(name, "")), path)
+            yield _save(draw_layer(plane.parent, name, locations.get(name, "")), path)
 
 
-def _draw_layer(directory: Path, name: str, location: str) -> Figure:
+def draw_layer(directory: Path, name: str, location: str) -> Figure:
     """The layer of cells of a gauge at some times: maps or, where it is a row of cells, profiles."""
     frames = load_frames(directory, TIMES)
     title = f"{name}: {location}" if location else name

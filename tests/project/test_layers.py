@@ -16,7 +16,7 @@ LAYERS = (
     {"__main__"},
     {"api"},
     {"commands"},
-    {"study"},
+    {"study", "report"},
     {"resources"},
     {"execution", "sweep"},
     {"simulation", "direct", "memory", "results"},
