@@ -124,8 +124,8 @@ class BarNetwork:
         for k, law in enumerate(self._laws):
             if law.bond:
                 own = self.nodes.law_of_node == k
-                most = self.nodes.surface[own] * bond_stress(law.bond, self.farthest[own])
-                resists[own] = np.clip(resists[own], -most, most)
+                bearable = self.nodes.surface[own] * bond_stress(law.bond, self.farthest[own])
+                resists[own] = np.clip(resists[own], -bearable, bearable)
         self.slipped = slip - resists / self._bond
         return resists
 
@@ -183,9 +183,9 @@ _NUMBERS = ("modulus", "yield_stress", "hardening", "failure_strain")
 _KEPT = ("plastic", "strained", "torn", "stress", "slipped", "farthest", "outside")
 
 
-def fit_weights(nodes: np.ndarray, places: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def fit_weights(nodes: np.ndarray, points: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """(k,) shares of points (k, D) with a `weight` (k,) in the linear fit at a node (D,): they keep linear fields."""
-    arm = places - nodes
+    arm = points - nodes
     basis = np.hstack([np.ones((len(arm), 1)), arm])
     moment = basis.T @ (weight[:, None] * basis)
     return np.asarray(weight * (basis @ np.linalg.pinv(moment, rcond=1e-8)[:, 0]))
