@@ -24,6 +24,8 @@ def check_loads(sections: Sections, domain: Domain, solid: Solid | None, has_flu
             yield Fault(path, "is for two or three dimensions without symmetry about an axis or a point")
         elif solid is not None and solid.obstacles:
             yield Fault(path, "presses on what it can move, but there are only obstacles")
+        elif solid is not None and any(body.bars for body in solid.bodies):
+            yield Fault(path, "is not yet for bodies with bars in them")
         elif solid is not None:
             load = given.build()
             try:

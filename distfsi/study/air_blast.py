@@ -12,11 +12,11 @@ import numpy as np
 
 from distfsi.air_blast import FREE_AIR, SURFACE, AirBlast, Burst, air_blast
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.output.fields import read_layer, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.description import Scene
 from distfsi.scene.shipped import shipped_inputs

@@ -153,6 +153,16 @@ def test_a_free_body_takes_the_impulse_of_the_curves(scene, text, burst):
     assert row[next(name for name in row if name.startswith("left energy"))] < 0.0
 
 
+def test_a_free_rigid_body_takes_it_too(scene):
+    """One that cannot deform, in 2D; the symmetry plane holds what pushes it across."""
+    text = STRIP.replace("solid.bodies.strip", "solid.rigid.strip").replace(SOFT, "\nspacing = 0.1\ndensity = 1000\n")
+    given = scene(text)
+    simulation = start(given)
+    while not simulation.done:
+        simulation.step()
+    assert simulation.solid.totals()["momentum"][0] == pytest.approx(impulse_of(given, SURFACE)[0], rel=1e-10)
+
+
 def test_a_body_that_is_held_hands_it_on(scene):
     """A rigid support gets all of it."""
     held = 'solid.bodies.block.fixed={kind="box", lower=[-1, -1, -1], upper=[1, 1, 1]}'
