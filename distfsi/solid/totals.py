@@ -102,8 +102,8 @@ class Totals:
         return total.reshape(D, 2, D)
 
     def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity and loads, and of what moves fixed particles, since the start, less the energy
-        that has left."""
+        """Collective. Work [J] of gravity, loads, and what moves fixed particles, since the start, less the energy that
+        has left."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
     def workload(self) -> np.ndarray:
