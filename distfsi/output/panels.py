@@ -76,7 +76,9 @@ def _draw_profile(axes: Axes, name: str, frames: Sequence[Frame], fitted: Sequen
 
 def _profile_names(frames: Sequence[Frame]) -> list[str]:
     """The fields worth a row: not zero everywhere at all times."""
-    return [name for name in PROFILES if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
+    fractions = sorted({name for f in frames for name in f.cells if name.startswith("volume_fraction_")})
+    names = [*PROFILES, *fractions]
+    return [name for name in names if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
 
 
 def _curves(frame: Frame, name: str) -> Iterator[tuple[np.ndarray, np.ndarray, str]]:
