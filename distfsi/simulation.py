@@ -28,9 +28,12 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
+from distfsi.scene.description import Solid as SolidScene
 from distfsi.scene.packing import pack
 from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
+from distfsi.solid.with_bars import SolidWithBars
+from distfsi.solid.with_rigid import SolidWithRigid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
 COUPLINGS: dict[str, Callable[..., Coupling]] = {
@@ -96,8 +99,8 @@ class Simulation:
         device = device or Cpu(threads or threads_of_rank(communicator))
         model = fluid_model(scene) if scene.fluid else None
         fluid = Fluid(scene, model, blocks, device.with_own_clock(), resumed) if model else None
-        structure = Obstacles if scene.solid and scene.solid.obstacles else Solid
-        solid = structure(scene, blocks, communicator, device.with_own_clock()) if scene.solid else None
+        parts = (scene, blocks, communicator, device.with_own_clock())
+        solid = structure_of(scene.solid)(*parts) if scene.solid else None
         coupling: Coupling | None = None
         if model and fluid and solid:
             coupled = COUPLINGS[scene.coupling.scheme]
@@ -268,6 +271,15 @@ class Simulation:
             return cells, None
         self.solid.label_pieces()
         return cells, self.solid.outputs()
+
+
+def structure_of(solid: SolidScene) -> type[Solid]:
+    """The kind of structure that moves these bodies."""
+    if solid.obstacles:
+        return Obstacles
+    if any(body.bars for body in solid.bodies):
+        return SolidWithBars
+    return SolidWithRigid if any(body.motion for body in solid.bodies) else Solid
 
 
 def deal_blocks(scene: Scene, communicator: Communicator, costs: np.ndarray | None = None) -> Blocks:

@@ -114,7 +114,8 @@ def time_step(
     maximum = coupling.sub_steps if coupling else 1
     rate_of = {Reason.FLUID: fluid_rate, Reason.WALL: wall_rate, Reason.SOLID: solid_rate / maximum}
     reason = max(rate_of, key=rate_of.__getitem__)
-    stable, left = 1.0 / rate_of[reason], limits.end - time
+    stable = 1.0 / rate_of[reason] if rate_of[reason] else np.inf  # nothing is left that could bound it
+    left = limits.end - time
     dt = min(stable, left)
     reason = reason if stable < left else Reason.END
     sub_steps = max(1, math.ceil(dt * solid_rate * (1.0 - 1e-12)))

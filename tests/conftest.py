@@ -17,6 +17,11 @@ def mpiexec() -> Callable[..., str]:
     return run
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """How much of what is random a test does."""
+    parser.addoption("--kills", type=int, help="points at which the long tests of killed runs kill, e.g. 200")
+
+
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Two processes; one where times are measured or there is one GPU for all."""
     return 0 if config.option.markexpr in ("idle", "gpu") else 2

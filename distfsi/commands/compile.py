@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> None:
     """Compile."""
     from distfsi.device.cache import cache_directory
-    from distfsi.run import compile_kernels
+    from distfsi.execution import compile_kernels
 
     communicator = start_ranks()
     with reported_once(communicator):

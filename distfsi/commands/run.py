@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> None:
     """Run the scene."""
-    from distfsi.run import run
+    from distfsi.execution import run
 
     communicator = start_ranks()
     with reported_once(communicator):

@@ -110,6 +110,10 @@ class SolidParticles:
         """(local blocks,) [J] of that impulse."""
         return self._solid.work
 
+    def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
+        """Collective. What rigid bodies make of the fluid's push: see solid/protocol.py."""
+        return self._solid.share_push(mass, gained, impulse, shared)
+
     # ---- columns of the coupling's own ------------------------------------------------------------------------------
 
     def attach(self, name: str, values: np.ndarray, shown: bool = False) -> None:

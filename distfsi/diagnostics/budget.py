@@ -53,6 +53,7 @@ class Budget:
                 f"solid kinetic energy [{self._joule}]",
                 f"solid internal energy [{self._joule}]",
                 *(["solid pieces"] if "piece" in solid.columns else []),
+                *solid.reported(),
             ]
         if coupling:
             self.columns += ["sub-steps", "sub-steps limited by"]
@@ -102,6 +103,7 @@ class Budget:
             values[f"solid internal energy [{self._joule}]"] = float(held["internal"])
             if (pieces := self.solid.pieces()) is not None:
                 values["solid pieces"] = len(pieces["piece"])
+            values |= self.solid.reported()
             left = left - np.array([*[0.0] * masses, *self.solid.boundary_impulse(), self.solid.gravity_work()])
         made = self.coupling.budget_by_cause() if self.coupling else {}
         left = left - sum(made[cause] for cause in (self.coupling.at_ends if self.coupling else ()))

@@ -276,6 +276,8 @@ class InitialState:
     def _on_isentrope(self, phase: int, known: FluidState, pressures: np.ndarray) -> np.ndarray:
         """Densities (n,) at which a phase reaches `pressures` (n,) along the isentrope through a known state:
         d rho/dp = 1/c^2."""
+        if np.all(pressures == known.pressure):
+            return np.full(pressures.shape, known.density)  # without the time that the integrator's import takes
         from scipy.integrate import solve_ivp
 
         reference_of, omega_of = self._references[phase], self._omegas[phase]

@@ -55,6 +55,18 @@ class Gauge(Law):
         """Keys of positions in the fluid, each with its coordinate [m] by axis."""
         return {}
 
+    def location(self, axes: str = AXES) -> str:
+        """Where it is, in words: "x = 1 m"; `axes`: their names."""
+        words = []
+        for key, position in self.positions().items():
+            values = [f"{x:g}" for x in position.values()]
+            words.append(f"{key} ({', '.join(values)}) m" if len(values) > 1 else f"{key} {_one(position, axes)} m")
+        return " ".join(words).removeprefix("position ")
+
+    def walls(self) -> Mapping[str, tuple[int, int]]:
+        """Keys of ends of the domain that must be walls, each with axis and side (0: low, 1: high)."""
+        return {}
+
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Keys whose values do not fit into a scene, each with what is wrong with it."""
         yield from ()
@@ -62,6 +74,11 @@ class Gauge(Law):
     def probe(self, run: Run) -> Probe:
         """Collective. What samples the run, which begins."""
         raise NotImplementedError
+
+
+def _one(position: Mapping[int, float], axes: str) -> str:
+    ((axis, x),) = position.items()
+    return f"{axes[axis]} = {x:g}"
 
 
 class FluidPoints(Protocol):
@@ -121,6 +138,9 @@ class Particles(Protocol):
 
     def body_totals(self, body: int) -> dict[str, np.ndarray]:
         """Collective. mass [kg], center of mass, momentum of a body, and the fluid's impulse on it in the last step."""
+
+    def wall_impulse(self) -> np.ndarray:
+        """Collective. Impulse (D, 2, D) [N s] that bodies have given to each wall of the domain, by axis and side."""
 
 
 class Run(Protocol):

@@ -16,12 +16,15 @@ QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": 
 @dataclass(frozen=True)
 class BodyGauge(Gauge):
     """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
-    mass, momentum, and the impulse that the fluid has given to it so far."""
+    mass, momentum, and the impulse that the fluid has given to it so far; of what has not left the domain."""
 
     body: str = entry("name of the body")
     every: float | None = each_step()
 
     needs = "solid"
+
+    def location(self, axes: str = AXES) -> str:
+        return f"body '{self.body}'"
 
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         if self.body not in bodies:
@@ -50,7 +53,7 @@ class BodyProbe(TableProbe):
     def rows(self, run: Run) -> np.ndarray:
         totals = self._totals
         force = totals["impulse"] / run.dt if run.dt > 0.0 else np.full_like(self._start, np.nan)
-        velocity = totals["momentum"] / totals["mass"]
+        velocity = totals["momentum"] / (totals["mass"] or np.nan)
         moved = totals["center"] - self._start
         return np.concatenate([force, velocity, moved, totals["momentum"], self._impulse])[None]
 

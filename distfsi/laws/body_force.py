@@ -29,6 +29,11 @@ class BodyForce:
             number.value = mean
         return changed
 
+    @property
+    def now(self) -> tuple[float, ...]:
+        """The numbers [m/s2] that kernels get."""
+        return tuple(g.value if isinstance(g, Varying) else g for g in self.acceleration)
+
 
 def _mean(sources: Iterable[Source], axis: int, start: float, end: float) -> float:
     """Acceleration [m/s2] of all sources along an axis, the mean over a time [s]."""

@@ -22,6 +22,23 @@ from distfsi.mesh.rows import Rows, chunks
 Parity = Literal["position"] | tuple[tuple[int, ...], ...]
 
 
+@dataclass(frozen=True)
+class Plane:
+    """Particles between `low` and `high` [m] along an axis have an image: mirrored in the `end` [m] of the domain, or
+    aside by the `shift` [m] of a periodic one."""
+
+    axis: int
+    end: float
+    low: float
+    high: float
+    shift: float = 0.0
+
+    @property
+    def change(self) -> float:
+        """What a position becomes its image by: `shift` or `end`."""
+        return self.shift or self.end
+
+
 class ParticleExchange:
     """Brings particles, and copies of them, to the ranks that need them."""
 
@@ -32,6 +49,7 @@ class ParticleExchange:
         self.rows = Rows(device, kernels)
         self._grid = blocks.grid_on(device), blocks.table_on(device)
         self._owners = device.array(blocks.owners)
+        self._periodic = sum(1 << axis for axis, ends in enumerate(blocks.grid.boundaries) if "periodic" in ends)
         self._key: Key | None = None
         self._images: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.staged: Any = None  # memory that the last exchange may still read
@@ -90,7 +108,7 @@ class ParticleExchange:
         image_reach: float | None = None,
         mirrors: Collection[str] = ("symmetry",),
     ) -> GhostPlan:
-        """Collective. Who needs copies of which particles, and the images at symmetry planes.
+        """Collective. Who needs copies of which particles, and the images at symmetry planes and periodic ends.
 
         A rank gets as ghosts all particles of others within `reach` [m] (along every axis) of one of its blocks; blocks
         at the ends of the grid extend to infinity. Particles and ghosts within `image_reach` [m], by default `reach`,
@@ -101,52 +119,69 @@ class ParticleExchange:
         """
         own, device = len(id), self.device
         image_reach = reach if image_reach is None else image_reach
-        planes = self.planes(image_reach, mirrors)
-        border, requested = self._border(position, reach, image_reach, planes), self._bonded(id, bonded)
+        planes = self.planes(image_reach, mirrors, self._overhang(position))
+        border, requested = self._border(position, reach, planes), self._bonded(id, bonded)
         chosen = np.unique(np.concatenate([border, *requested.values(), self._with_images(id, bonded)]))
         near = device.download(self.rows.taken(position, device.array(chosen)))
         pairs = [rank * own + rows for rank, rows in requested.items()] + self._near(near, chosen, own, reach)
+        pairs += [pair for at, of in self._aside(near, planes) for pair in self._near(at, chosen[of], own, reach)]
         ranks, rows = np.divmod(np.unique(np.concatenate(pairs)), max(own, 1))
         route = Route(self.blocks.communicator, ranks)
         arrived = route.brought({"position": near[np.searchsorted(chosen, rows)], "id": id[rows]})
         row = np.concatenate([chosen, own + np.arange(len(arrived))])  # of what may have images
         position, known = np.concatenate([near, arrived["position"]]), np.concatenate([id[chosen], arrived["id"]])
-        mask, plane = self._mirrored(position, known, image_reach, planes, bonded)
+        mask, change = self._mirrored(position, known, planes, bonded)
         source, mask = images(mask)
         key = self._known_key(id, np.concatenate([arrived["id"] * IMAGES, known[source] * IMAGES + mask]))
-        return GhostPlan(
-            own, len(key.host), key, self, route, device.array(rows), Images(device, row[source], mask, plane[source])
-        )
+        found = Images(device, row[source], mask, self._periodic, change[source])
+        return GhostPlan(own, len(key.host), key, self, route, device.array(rows), found)
 
-    def _border(self, position: Any, reach: float, image_reach: float, planes: list[tuple[int, float]]) -> np.ndarray:
-        """The own particles within `reach` of other ranks' blocks or `image_reach` of a plane."""
+    def _border(self, position: Any, reach: float, planes: list[Plane]) -> np.ndarray:
+        """The own particles within `reach` of other ranks' blocks, or with images."""
         communicator = self.blocks.communicator
         if communicator.size == 1 and not planes:
             return np.empty(0, dtype=np.int64)
-        axes, positions = (np.array([plane[k] for plane in planes], dtype) for k, dtype in ((0, np.int64), (1, float)))
+        axes = self.device.array(np.array([plane.axis for plane in planes], dtype=np.int64))
+        low, high = (self.device.array(np.array([getattr(p, end) for p in planes])) for end in ("low", "high"))
         mark = self.device.empty(position.shape[0], np.int8)
-        mirrors = (self.device.array(axes), self.device.array(positions))
-        given = (position, reach, image_reach, *mirrors, *self._grid, self._owners, communicator.rank, mark)
+        given = (position, reach, axes, low, high, *self._grid, self._owners, communicator.rank, mark)
         self.device.run(self.kernels.find_border, position.shape[0], *given)
         return self.device.download(self.rows.marked(mark)[1])
 
+    def _overhang(self, position: Any) -> float:
+        """Collective. How far particles are beyond periodic ends [m]."""
+        if not self._periodic:
+            return 0.0
+        grid, bounds = self.blocks.grid, self.rows.bounds(position)
+        axes = [axis for axis in range(grid.dimensions) if self._periodic >> axis & 1]
+        beyond = [max(grid.lower[a] - bounds[0][a], bounds[1][a] - grid.upper[a], 0.0) for a in axes]
+        return float(self.blocks.communicator.maximum(np.array([max(beyond)]))[0])
+
+    def _aside(self, position: np.ndarray, planes: list[Plane]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Where particles at a `position` (n, D) [m] have images aside, (m, D) each with which particles (m,) these are
+        of; images of images, too."""
+        found = [(position, np.arange(len(position)))]
+        for axis in {plane.axis for plane in planes if plane.shift}:
+            for at, source in list(found):
+                for plane in (plane for plane in planes if plane.axis == axis):
+                    close = (plane.low <= at[:, axis]) & (at[:, axis] <= plane.high)
+                    moved = at[close].copy()
+                    moved[:, axis] += plane.shift
+                    found.append((moved, source[close]))
+        return found[1:]
+
     def _mirrored(
-        self,
-        position: np.ndarray,
-        id: np.ndarray,
-        reach: float,
-        planes: list[tuple[int, float]],
-        bonded: np.ndarray | None,
+        self, position: np.ndarray, id: np.ndarray, planes: list[Plane], bonded: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The axes (n,), as bits, along which particles have images, and where (n, dimensions) [m] the planes are."""
-        near, plane = np.zeros(len(id), dtype=np.int64), np.zeros_like(position)
-        for axis, at in planes:
-            close = np.abs(position[:, axis] - at) <= reach
-            near[close] |= 1 << axis
-            plane[close, axis] = at
+        """The axes (n,), as bits, along which particles have images, and how these are changed (n, dimensions) [m]."""
+        near, change = np.zeros(len(id), dtype=np.int64), np.zeros_like(position)
+        for plane in planes:
+            close = (plane.low <= position[:, plane.axis]) & (position[:, plane.axis] <= plane.high)
+            near[close] |= 1 << plane.axis
+            change[close, plane.axis] = plane.change
         if bonded is not None:
-            self._need_images(position, id, bonded, planes, near, plane)
-        return near, plane
+            self._need_images(position, id, bonded, planes, near, change)
+        return near, change
 
     def _with_images(self, id: np.ndarray, bonded: np.ndarray | None) -> np.ndarray:
         """The own particles of which a bond needs an image; found again when `id` or `bonded` are other arrays."""
@@ -169,19 +204,18 @@ class ParticleExchange:
         position: np.ndarray,
         id: np.ndarray,
         bonded: np.ndarray,
-        planes: list[tuple[int, float]],
+        planes: list[Plane],
         near: np.ndarray,
-        plane: np.ndarray,
+        change: np.ndarray,
     ) -> None:
-        """Enter the images that bonds need into `near` (n,) and `plane` (n, dimensions): in the nearest planes."""
+        """Enter the images that bonds need into `near` (n,) and `change` (n, dimensions): by the nearest ends."""
         bonded = bonded[bonded % IMAGES > 0]
         order = np.argsort(id)
         rows = order[np.searchsorted(id, bonded // IMAGES, sorter=order)]
         np.bitwise_or.at(near, rows, bonded % IMAGES)
-        for axis in {axis for axis, _ in planes}:
-            along = np.array([at for a, at in planes if a == axis])
-            nearest = along[np.argmin(np.abs(position[rows, axis][:, None] - along), axis=1)]
-            plane[rows, axis] = nearest
+        for axis in {plane.axis for plane in planes}:
+            ends, changes = (np.array([getattr(p, k) for p in planes if p.axis == axis]) for k in ("end", "change"))
+            change[rows, axis] = changes[np.argmin(np.abs(position[rows, axis][:, None] - ends), axis=1)]
 
     def _bonded(self, id: np.ndarray, bonded: np.ndarray | None) -> dict[int, np.ndarray]:
         """Collective. The own particles whose ids other ranks ask for, by rank."""
@@ -206,16 +240,26 @@ class ParticleExchange:
             pairs.append(rank[other] * own + rows[inside][other])
         return pairs
 
-    def planes(self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",)) -> list[tuple[int, float]]:
-        """(axis, position [m]) of the planes that mirror; raises InputError when two are closer than twice `reach`."""
-        grid = self.blocks.grid
-        planes = []
+    def planes(
+        self, reach: float = 0.0, mirrors: Collection[str] = ("symmetry",), overhang: float = 0.0
+    ) -> list[Plane]:
+        """Those of all images. At mirrors particles have one within `reach` [m]; at periodic ends all that may be
+        within it of what is up to `overhang` [m] beyond the other end. Raises InputError when a particle could have two
+        along one axis."""
+        grid, planes = self.blocks.grid, []
         for axis in range(grid.dimensions):
-            ends = zip(grid.boundaries[axis], (grid.lower[axis], grid.upper[axis]), strict=True)
-            found = [at for kind, at in ends if kind in mirrors]
-            if len(found) == 2 and found[1] - found[0] <= 2 * reach:
+            kinds, ends = grid.boundaries[axis], (grid.lower[axis], grid.upper[axis])
+            wide, far = ends[1] - ends[0], reach + overhang
+            if "periodic" in kinds:
+                if wide <= 2.0 * far:
+                    text = f"{wide} m between periodic ends; particles {overhang} m beyond them reach {reach} m"
+                    raise InputError([f"domain: {text}, and would meet what they have met"])
+                planes.append(Plane(axis, ends[0], -np.inf, ends[0] + far, wide))
+                planes.append(Plane(axis, ends[1], ends[1] - far, np.inf, -wide))
+            found = [at for kind, at in zip(kinds, ends, strict=True) if kind in mirrors]
+            if len(found) == 2 and wide <= 2 * reach:
                 raise InputError([f"domain: planes {found} m that mirror are less than {2 * reach} m apart"])
-            planes += [(axis, at) for at in found]
+            planes += [Plane(axis, at, at - reach, at + reach) for at in found]
         return planes
 
 
@@ -234,11 +278,13 @@ class Key:
 
 
 class Images:
-    """On the device: the rows (count,) that images are of, the axes they are mirrored along, where the planes are."""
+    """On the device: the rows (count,) that images are of, the axes along which they are images, those of them that
+    mirror, and how positions change; all images are `shifted` along the axes in these bits."""
 
-    def __init__(self, device: Device, source: np.ndarray, mask: np.ndarray, plane: np.ndarray) -> None:
-        self.count = len(source)
-        self.source, self.mask, self.plane = device.array(source), device.array(mask), device.array(plane)
+    def __init__(self, device: Device, source: np.ndarray, mask: np.ndarray, shifted: int, change: np.ndarray) -> None:
+        self.count, self.shifted = len(source), shifted
+        self.source, self.mask, self.change = device.array(source), device.array(mask), device.array(change)
+        self.mirrored = device.array(mask & ~shifted)
 
 
 @dataclass
@@ -247,7 +293,7 @@ class GhostPlan:
 
     own     number of this rank's particles
     count   number of particles, ghosts and images
-    key     (count,) int64: 8 id + the axes an image is mirrored along (bit a: axis a); unique. One object as long as
+    key     (count,) int64: 8 id + the axes along which it is an image (bit a: axis a); unique. One object as long as
             nothing of it changes
     """
 
@@ -289,10 +335,11 @@ class GhostPlan:
         extended, first = device.empty((self.count, *array.shape[1:])), self.count - images.count
         flat = extended.reshape(-1)
         device.run(kernels.extend, first, self.own, width, array.reshape(-1), stride, column, packed, flat)
-        mirrors = (first, width, images.source, images.mask)
         if parity == "position":
-            device.run(kernels.mirror_positions, images.count, *mirrors, images.plane, flat)
+            given = (images.source, images.mask, images.shifted, images.change)
+            device.run(kernels.position_images, images.count, first, width, *given, flat)
         elif images.count:
             odd = [sum(1 << axis for axis in set(axes) if axes.count(axis) % 2) for axes in parity]
-            device.run(kernels.mirror_values, images.count, *mirrors, device.array(np.array(odd)), flat)
+            signs = device.array(np.array(odd))
+            device.run(kernels.mirror_values, images.count, first, width, images.source, images.mirrored, signs, flat)
         return extended

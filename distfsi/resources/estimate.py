@@ -25,7 +25,7 @@ from distfsi.scene.signals import Layout, end_time, moving_share, steps, sub_ste
 from distfsi.simulation import deal_blocks
 
 PROCESS_BYTES = 140e6  # of a rank that has no blocks: Python and its libraries
-KERNEL_BYTES = 102e6  # of numba and compiled kernels, where there are blocks
+KERNEL_BYTES = 102e6  # of numba and compiled kernels: of a fluid where there are blocks, of solids on all ranks
 DRAWING_BYTES, PICTURE_BYTES = 45e6, 25e6  # on the first rank: of matplotlib, of the maps of a fluid in the summary
 COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
@@ -115,7 +115,7 @@ class Resources:
         if self.scene.fluid and self.scene.solid:
             kernels += COUPLING_BYTES * self.dimensions
         first, *others = (
-            PROCESS_BYTES + arrays + (kernels if blocks.local_count else 0.0)
+            PROCESS_BYTES + arrays + (kernels if blocks.local_count or self.scene.solid else 0.0)
             for blocks, arrays in zip(self.blocks, self._arrays(), strict=True)
         )
         return max([first + drawing, *others])

@@ -31,19 +31,20 @@ from distfsi.scene.description import (
 )
 from distfsi.scene.detonation_tables import DetonationInput
 from distfsi.scene.law_tables import SourceInput
-from distfsi.scene.motion import Motion
+from distfsi.scene.motion import Free, Motion, Support
+from distfsi.scene.rigid_tables import ObstacleInput, RigidInput, SupportInput
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
     MapInput,
-    ObstacleInput,
     OutputInput,
     PerformanceInput,
     SolidInput,
     StateInput,
     TimeInput,
 )
+from distfsi.scene.shapes import volume
 from distfsi.scene.shocks import chapman_jouguet
 from distfsi.scene.thermodynamics import pressure
 
@@ -52,6 +53,7 @@ TILE_CELLS = ((512,), (128, 32), (64, 8, 8))
 AXES = ("x", "y", "z")
 SIDES = ("low", "high")
 ARRIVAL = 0.01  # of the ambient pressure
+STIFF = 100.0  # times the highest pressure of a fluid: a modulus with which rigid bodies meet
 
 
 def build_domain(given: DomainInput) -> Domain:
@@ -120,8 +122,8 @@ def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> Flu
     return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
 
 
-def build_solid(given: SolidInput, dimensions: int) -> Solid:
-    """Bodies and method of the solid."""
+def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> Solid:
+    """Bodies and method of the solid; highest_pressure [Pa] of the fluid at the start, 0: there is none."""
     bodies = tuple(
         Body(
             name,
@@ -138,19 +140,29 @@ def build_solid(given: SolidInput, dimensions: int) -> Solid:
             body.packing,
             body.lattice_angle,
             body.form,
+            bars=body.bars.build(body.spacing) if body.bars else None,
         )
         for name, body in given.bodies.items()
     )
-    rigid = tuple(_obstacle(name, obstacle, dimensions) for name, obstacle in given.obstacles.items())
+    stiffest = max(bodies, key=_modulus, default=None)
+    met = (_modulus(stiffest), stiffest.density) if stiffest else (STIFF * highest_pressure or 1.0, 1.0)
+    rigid = tuple(_rigid(name, body, dimensions, met[0]) for name, body in given.rigid.items())
+    obstacles = tuple(_obstacle(name, body, dimensions, *met) for name, body in given.obstacles.items())
     viscosity = (given.viscosity_alpha, given.viscosity_beta)
     form = (given.objective_rate, given.form)
-    rest = (given.zero_energy, given.artificial_stress, bool(rigid), given.friction)
-    return Solid(bodies + rigid, given.smoothing, *viscosity, *form, *rest, tied=given.tied)
+    rest = (given.zero_energy, given.artificial_stress, given.friction)
+    return Solid(bodies + rigid + obstacles, given.smoothing, *viscosity, *form, *rest, given.tied, given.wall_friction)
 
 
-def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:
-    """A body whose laws nobody asks for: no force ever acts in it."""
-    rest, motion = (0.0,) * dimensions, None
+def _modulus(body: Body) -> float:
+    """[Pa] of waves at rest."""
+    return float(body.density * body.eos.reference_sound_speed(body.density) ** 2)
+
+
+def _obstacle(name: str, given: ObstacleInput, dimensions: int, modulus: float, density: float) -> Body:
+    """A body whose law tells only how it meets others: with a `modulus` [Pa] and a `density` [kg/m3] of its surface."""
+    rest = (0.0,) * dimensions
+    motion = Motion((0.0,), (rest,), (0.0,), rest)
     if given.motion is not None:
         rows = len(given.motion.times)
         motion = Motion(
@@ -160,9 +172,24 @@ def _obstacle(name: str, given: ObstacleInput, dimensions: int) -> Body:
             given.motion.about or rest,
             given.motion.axis or (),
         )
+    laws = (LinearEos(modulus), NoStrength())
     shape = given.shape.build()
-    laws = (LinearEos(1.0), NoStrength())
-    return Body(name, shape, given.spacing, 1.0, rest, *laws, None, packing=given.packing, motion=motion)
+    return Body(name, shape, given.spacing, density, rest, *laws, None, packing=given.packing, motion=motion)
+
+
+def _rigid(name: str, given: RigidInput, dimensions: int, modulus: float) -> Body:
+    """A rigid body that moves freely; `modulus` [Pa]: how it meets others where it does not tell itself."""
+    shape, rest = given.shape.build(), (0.0,) * dimensions
+    supports = tuple(_support(support, rest) for support in given.supports)
+    motion = Free(given.spin or (), given.mass, given.inertia or (), supports)
+    density = given.density or present(given.mass) / volume(shape)
+    laws = (LinearEos(given.modulus or modulus), NoStrength())
+    velocity = given.velocity or rest
+    return Body(name, shape, given.spacing, density, velocity, *laws, None, packing=given.packing, motion=motion)
+
+
+def _support(given: SupportInput, none: tuple[float, ...]) -> Support:
+    return Support(given.at, given.stiffness or none, given.damping or none, given.strength)
 
 
 def build_output(given: OutputInput, stem: str, fluid: Fluid | None) -> Output:

@@ -12,7 +12,6 @@ import numpy as np
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Source
 from distfsi.laws.registry import word_of
-from distfsi.narrowing import present
 from distfsi.scene.build import AXES, SIDES, build_sources, stop_file_in
 from distfsi.scene.cloud import Cloud
 from distfsi.scene.coordinate_checks import check_coordinates
@@ -34,6 +33,7 @@ from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
 from distfsi.scene.packing import pack, uses_rings
+from distfsi.scene.rigid_checks import check_bars, check_rigid, check_ties
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
@@ -79,9 +79,10 @@ def check(
     yield from check_directory(sections.output.directory or "")
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
-        yield from check_obstacles(sections, solid, domain, "fluid" in present)
+        yield from check_rigid(sections, solid, domain, "fluid" in present)
+        yield from check_bars(solid, domain)
         ties = list(check_ties(solid))
-        yield from ties or check_solid(solid, domain)
+        yield from ties or check_solid(solid, domain, sections.fluid is not None)
         if fluid is not None and len(fluid.phases) > 2:
             yield Fault(("fluid", "phases"), "beside a solid one or two phases are known, not yet more")
         elif fluid is not None:
@@ -197,50 +198,17 @@ def check_inflow(given: FluidInput, domain: Domain) -> Iterator[Fault]:
             yield Fault(path, f"has a state, but the {SIDES[side]} {AXES[axis]} end of the domain {what}")
 
 
-def check_obstacles(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
-    """There is something; and obstacles are what stands in a fluid, alone so far."""
-    given = present(sections.solid)
-    bodies, obstacles = given.bodies, given.obstacles
-    if not (bodies or obstacles):
-        yield Fault(("solid", "bodies"), "is missing; expected [solid.bodies.NAME] or [solid.obstacles.NAME]")
-    if not obstacles:
-        return
-    path = ("solid", "obstacles")
-    if bodies:
-        yield Fault(path, "beside bodies are not known yet; expected one or the other (a body may be held by `fixed`)")
-    if not in_fluid:
-        yield Fault(path, "are what a fluid meets; expected [fluid]")
-    if sections.coupling.scheme == "immersed_boundary":
-        yield Fault(("coupling", "scheme"), "'immersed_boundary' knows no obstacles; expected 'cut_cells'")
-    for body in solid.bodies:
-        if body.motion and any(body.motion.angles) and bool(body.motion.axis) != (domain.dimensions == 3):
-            text = "an axis is needed to turn in 3D" if domain.dimensions == 3 else "only in 3D there is an axis"
-            yield Fault((*path, body.name, "motion"), text)
-
-
-def check_ties(solid: Solid) -> Iterator[Fault]:
-    """Ties name bodies that are there, of one form."""
-    bodies = {body.name: body for body in solid.bodies}
-    for n, names in enumerate(solid.tied):
-        path = ("solid", "tied", n)
-        if unknown := [name for name in names if name not in bodies]:
-            yield Fault(path, f"'{unknown[0]}' is no body" + one_of(bodies, unknown[0]))
-        elif len(set(names)) < 2:
-            yield Fault(path, "expected two bodies or more")
-        elif len({solid.form_of(bodies[name]) for name in names}) > 1:
-            yield Fault(path, "tied bodies need one form")
-
-
-def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
-    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form."""
+def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
+    """Bodies lie in the domain, can be packed and do not overlap; a method that has its form; ends that know them."""
     if solid.artificial_stress > 0.0 and "updated_lagrangian" not in map(solid.form_of, solid.bodies):
         yield Fault(("solid", "artificial_stress"), 'bonds cannot clump; it needs form = "updated_lagrangian"')
     for axis, ends in enumerate(domain.boundaries):
-        if "periodic" in ends:
-            yield Fault(("domain", AXES[axis]), "periodic; a scene with solids needs ends of another kind")
+        if "periodic" in ends and (in_fluid or any(body.motion for body in solid.bodies)):
+            which = "bodies in a fluid" if in_fluid else "rigid parts"
+            yield Fault(("domain", AXES[axis]), f"periodic; a scene with {which} needs ends of another kind")
     packed: list[tuple[Body, np.ndarray]] = []
     for body in solid.bodies:
-        path = (*_bodies_of(solid), body.name)
+        path = body.path
         faults = list(_check_body(path, body, domain))
         if faults:
             yield from faults
@@ -259,12 +227,7 @@ def check_solid(solid: Solid, domain: Domain) -> Iterator[Fault]:
         (a, points_of_a), (b, points_of_b) = first, second
         points, spacings = np.concatenate([points_of_a, points_of_b]), (a.spacing, b.spacing)
         if (thickness := overlap(a.shape, b.shape, points, max(spacings))) > TOUCHING * min(spacings):
-            yield Fault((*_bodies_of(solid), b.name, "shape"), f"overlaps body '{a.name}' by {thickness:.6g} m")
-
-
-def _bodies_of(solid: Solid) -> Path:
-    """Where the input has them."""
-    return ("solid", "obstacles" if solid.obstacles else "bodies")
+            yield Fault((*b.path, "shape"), f"overlaps body '{a.name}' by {thickness:.6g} m")
 
 
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
@@ -344,7 +307,7 @@ def check_coupling(given: CouplingInput, solid: Solid, domain: Domain, fluid: Fl
     coarsest = COARSEST_SPACING * min(domain.spacing)
     for body in solid.bodies:
         if body.spacing > coarsest:
-            path = (*_bodies_of(solid), body.name, "spacing")
+            path = (*body.path, "spacing")
             text = f"{body.spacing:.6g} m is too coarse for the fluid cells; expected at most {coarsest:.6g} m"
             yield Fault(path, f"{text}, {COARSEST_SPACING} of the smallest cell; half a cell is better")
 
@@ -380,14 +343,17 @@ def check_gauges(
         if gauge.needs not in present:
             yield Fault((*path, "kind"), f"'{table.kind}' needs a {gauge.needs}")
         elif gauge.needs == "fluid" or solid is not None:
-            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _outside(gauge, domain):
+            for key, text in list(gauge.faults(domain.dimensions, bodies)) or _misplaced(gauge, domain):
                 yield Fault((*path, key), text + (one_of(bodies, getattr(gauge, key)) if key == "body" else ""))
 
 
-def _outside(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
+def _misplaced(gauge: Gauge, domain: Domain) -> Iterator[tuple[str, str]]:
     for key, position in gauge.positions().items():
         if not all(domain.lower[axis] <= x <= domain.upper[axis] for axis, x in position.items()):
             yield key, "lies outside the domain"
+    for key, (axis, side) in gauge.walls().items():
+        if (kind := domain.boundaries[axis][side]) != "wall":
+            yield key, f"is an end of kind '{kind}'; expected a wall"
 
 
 def check_performance(given: PerformanceInput, dimensions: int) -> Iterator[Fault]:

@@ -17,7 +17,8 @@ from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
-from distfsi.scene.motion import Motion
+from distfsi.scene.bars import Bars
+from distfsi.scene.motion import Free, Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
 SolidForm = Literal["total_lagrangian", "updated_lagrangian"]
@@ -233,6 +234,8 @@ class Body:
     the surface, of hollow bodies at the inner one: it grows with r in a full body and keeps volumes in a hollow one.
     `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
     cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
+    A body with a `motion` is rigid: an obstacle, which stands or goes as told, or free; its law tells how
+    it meets others. `bars` that lie in it.
     """
 
     name: str
@@ -249,18 +252,24 @@ class Body:
     packing: Packing | None = None
     lattice_angle: float = 0.0
     form: SolidForm | None = None
-    motion: Motion | None = None
+    motion: Motion | Free | None = None
+    bars: Bars | None = None
+
+    @property
+    def path(self) -> tuple[str, str, str]:
+        """Where the input has it."""
+        kind = {Motion: "obstacles", Free: "rigid"}.get(type(self.motion), "bodies")
+        return ("solid", kind, self.name)
 
 
 @dataclass(frozen=True)
 class Solid:
     """All bodies and how they are computed. h = smoothing * spacing; artificial viscosity alpha, beta (Eq. 6).
 
-    `obstacles`: no force moves any of them; they stand, or go by their `motion`.
-
     `zero_energy`: the stiffness of bonds against what the deformation gradient does not see, in shear moduli;
     `artificial_stress`: the share of the tension with which particles without bonds resist clumping, 0: none.
-    `friction`: Coulomb's coefficient between bodies. `tied`: names of bodies that hold together where they touch.
+    `friction`: Coulomb's coefficient between bodies; `wall_friction`: at walls of the domain. `tied`: names of bodies
+    that hold together where they touch.
     """
 
     bodies: tuple[Body, ...]
@@ -271,13 +280,18 @@ class Solid:
     form: SolidForm = "total_lagrangian"
     zero_energy: float = 4.0 / 3.0
     artificial_stress: float = 0.0
-    obstacles: bool = False
     friction: float = 0.0
     tied: tuple[tuple[str, ...], ...] = ()
+    wall_friction: float = 0.0
 
-    def form_of(self, body: Body) -> SolidForm:
+    def form_of(self, body: Body) -> SolidForm | Literal["rigid"]:
         """The form of a body: its own or that of the solid."""
-        return body.form or self.form
+        return "rigid" if body.motion else body.form or self.form
+
+    @property
+    def obstacles(self) -> bool:
+        """Whether no force moves any of them: they stand, or go as told."""
+        return all(isinstance(body.motion, Motion) for body in self.bodies)
 
     @property
     def first_tied(self) -> tuple[int, ...]:
@@ -378,8 +392,18 @@ class Performance:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a scene comes from: the input file, its text, and the settings that were laid over it."""
+
+    file: str
+    text: str
+    settings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it;
+    `origin`: None for a scene that was made in Python, and for a stage."""
 
     title: str
     domain: Domain
@@ -393,3 +417,12 @@ class Scene:
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
+    origin: Origin | None = field(default=None, compare=False)
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        """[Pa] that overpressure counts from; None where it is another at each place, or without a fluid."""
+        if self.fluid is None or self.fluid.hydrostatic_level is not None:
+            return None
+        peaks = self.output.peaks
+        return peaks.ambient_pressure if peaks else self.fluid.regions[0].state.pressure

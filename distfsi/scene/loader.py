@@ -15,7 +15,7 @@ from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.coordinate_checks import check_map_is_there
-from distfsi.scene.description import Scene, Shape
+from distfsi.scene.description import Origin, Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
@@ -34,7 +34,17 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     Raises InputError with one line per fault: file, key, line, what was given, what was expected.
     """
     file = File(path)
-    text, data = _read(file)
+    return _scene(file, *_read(file), overrides)
+
+
+def scene_again(origin: Origin) -> Scene:
+    """A scene from where it came from, even if the file is there no more. Raises InputError."""
+    file = File(origin.file)
+    return _scene(file, origin.text, _tables(file, origin.text), origin.settings)
+
+
+def _scene(file: File, text: str, data: dict[str, Any], overrides: Sequence[str]) -> Scene:
+    """The scene of a file with this `text`, which holds `data`."""
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
@@ -55,7 +65,8 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     if faults or scene is None:
         raise InputError(locations.tell(faults))
     noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
-    return replace(scene, notes=noted, stages=tuple(stages))
+    origin = Origin(str(file.absolute()), text, tuple(overrides))
+    return replace(scene, notes=noted, stages=tuple(stages), origin=origin)
 
 
 def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
@@ -76,9 +87,8 @@ def _open_surfaces(scene: Scene) -> Iterator[Fault]:
     shapes: list[tuple[Path, Shape | None]] = []
     for n, region in enumerate(scene.fluid.regions if scene.fluid else ()):
         shapes.append((("fluid", "regions", n, "shape"), region.shape))
-    kind = "obstacles" if scene.solid and scene.solid.obstacles else "bodies"
     for body in scene.solid.bodies if scene.solid else ():
-        shapes += [(("solid", kind, body.name, key), getattr(body, key)) for key in ("shape", "fixed")]
+        shapes += [((*body.path, key), getattr(body, key)) for key in ("shape", "fixed")]
     for path, shape in shapes:
         for mesh in meshes_in(shape):
             if count := mesh.surface.open_edges:
@@ -101,8 +111,13 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
         text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise InputError([f"{file}: is no UTF-8 text"]) from error
+    return text, _tables(file, text)
+
+
+def _tables(file: File, text: str) -> dict[str, Any]:
+    """Tables of the text of a file."""
     try:
-        return text, tomllib.loads(text)
+        return tomllib.loads(text)
     except ValueError as error:  # of tomllib, or of a number of thousands of digits
         cause = error if isinstance(error, tomllib.TOMLDecodeError) else "a number has too many digits"
         raise InputError([f"{file}: is no TOML: {cause}"]) from error
@@ -151,7 +166,8 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
     domain = build.build_domain(sections.domain) if sections.domain else None
     dimensions = domain.dimensions if domain else 1
     fluid = build.build_fluid(sections.fluid, dimensions) if sections.fluid else None
-    solid = build.build_solid(sections.solid, dimensions) if sections.solid else None
+    pressure = max((region.state.pressure for region in fluid.regions), default=0.0) if fluid else 0.0
+    solid = build.build_solid(sections.solid, dimensions, pressure) if sections.solid else None
     faults = list(checks.check(sections, data.keys(), domain, fluid, solid))
     if not {"fluid", "solid"} & data.keys():
         faults.append(Fault((), "has no material; expected [fluid], [solid] or both"))

@@ -1,4 +1,4 @@
-"""Motion that a scene prescribes: how a rigid part goes and turns over time, between the rows of a table."""
+"""How rigid parts move: as a table prescribes, or freely, by the forces on them."""
 
 from __future__ import annotations
 
@@ -21,6 +21,11 @@ class Motion:
     angles: tuple[float, ...]
     about: tuple[float, ...]
     axis: tuple[float, ...] = ()
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is none."""
+        return len(self.times) == 1
 
     def positions(self, reference: np.ndarray, time: float) -> np.ndarray:
         """Where points are at `time` [s] that were at `reference` (n, D) [m] at the start."""
@@ -52,3 +57,29 @@ class Motion:
         if not any(self.angles):
             return np.eye(D)
         return rotation(D, float(np.interp(time, self.times, self.angles)), self.axis)
+
+
+@dataclass(frozen=True)
+class Support:
+    """A spring and a dashpot between the ground and the point `at` (D,) [m] of a rigid body, where it is at the start
+    (None: its center of mass): along each axis the force -stiffness * displacement - damping * velocity, in N/m and
+    N s/m, per metre of what is not computed. One of a `strength` [N] is gone once its force has exceeded that."""
+
+    at: tuple[float, ...] | None
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...]
+    strength: float | None = None
+
+
+@dataclass(frozen=True)
+class Free:
+    """A rigid body that forces move. At first it turns by `spin` [rad/s]: in 2D one number, in 3D a vector.
+
+    mass [kg], None: as its density tells; inertia [kg m2]: in 2D one number, in 3D about x, y and z through the center
+    of mass, None: as of its shape; per metre of what is not computed.
+    """
+
+    spin: tuple[float, ...] = ()
+    mass: float | None = None
+    inertia: tuple[float, ...] = ()
+    supports: tuple[Support, ...] = ()

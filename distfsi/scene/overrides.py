@@ -11,6 +11,7 @@ from distfsi.scene.faults import Fault, Path, dotted, one_of
 NAMED: dict[Path, str] = {
     ("fluid", "phases"): "phase",
     ("solid", "bodies"): "body",
+    ("solid", "rigid"): "rigid body",
     ("solid", "obstacles"): "obstacle",
 }  # tables of names, which an override cannot add to
 TABLES: set[Path] = {*NAMED, ("gauges",), ("sources",)}  # all tables of names

@@ -34,7 +34,8 @@ def far_outside(fluid: Fluid | None, bodies: tuple[Body, ...]) -> Iterator[str]:
         if isinstance(phase.eos, StiffenedGas) and phase.eos.p_inf > LIQUID_STIFFNESS:
             yield from _beyond(where, "density", state.density, LIQUIDS, "liquids", "kg/m3")
     for body in bodies:
-        yield from _body(body)
+        if not body.motion:  # rigid parts have the numbers that their scene wants
+            yield from _body(body)
 
 
 def _body(body: Body) -> Iterator[str]:

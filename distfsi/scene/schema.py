@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.bar_tables import BarsInput
 from distfsi.scene.charges import ChargeInput
 from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
 from distfsi.scene.law_tables import (
@@ -22,11 +21,11 @@ from distfsi.scene.law_tables import (
 )
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
+from distfsi.scene.rigid_tables import ObstacleInput, RigidInput
 from distfsi.scene.values import (
     Acceleration,
     Count,
     Density,
-    Direction,
     Length,
     PhaseName,
     Position,
@@ -206,45 +205,17 @@ class BodyInput(Table):
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
     )
     form: description.SolidForm | None = Field(None, description="as `form` of the solid, of this body alone")
-
-
-class MotionInput(Table):
-    """How an obstacle goes over time: a table, between whose rows speeds are constant; then it stands."""
-
-    times: tuple[quantity("s", ge=0.0), ...] = Field(min_length=2, description="times of the rows, the first 0")
-    displacements: tuple[Position, ...] | None = Field(None, description="how far it has gone then; default not at all")
-    angles: tuple[quantity("rad"), ...] | None = Field(None, description="how far it has turned; default not at all")
-    about: Position | None = Field(None, description="a point of the axis at the start; default the origin")
-    axis: Direction | None = Field(None, description="direction of the axis; 3D only, and needed there to turn")
-
-    @model_validator(mode="after")
-    def _whole(self) -> MotionInput:
-        rows = len(self.times)
-        if self.times[0] != 0.0 or any(a >= b for a, b in itertools.pairwise(self.times)):
-            raise ValueError("times must begin with 0 and grow")
-        for name in ("displacements", "angles"):
-            given = getattr(self, name)
-            if given is not None and len(given) != rows:
-                raise ValueError(f"{name} has {len(given)} rows, times {rows}")
-            if given is not None and np.any(np.asarray(given[0])):
-                raise ValueError(f"{name} must begin with 0: the shape is where the obstacle is at the start")
-        return self
-
-
-class ObstacleInput(Table):
-    """A rigid part that no force moves: it stands or goes as told, and costs no steps of particles."""
-
-    shape: Shape = Field(description="what it fills; a half_space is cut to the domain")
-    spacing: Length = Field(description="distance between the points of its wall; at most 0.75 of a cell, better 0.5")
-    packing: description.Packing | None = Field(None, description="as of a body")
-    motion: MotionInput | None = Field(None, description="how it goes; default it stands")
+    bars: BarsInput | None = Field(None, description="bars that lie in it; default none")
 
 
 class SolidInput(Table):
-    """Solid bodies, computed with smoothed particles; or obstacles."""
+    """Solid bodies: such that deform, computed with smoothed particles, rigid ones, and obstacles."""
 
     bodies: dict[str, BodyInput] = Field({}, description="`[solid.bodies.NAME]`: the bodies")
-    obstacles: dict[str, ObstacleInput] = Field({}, description="`[solid.obstacles.NAME]`: rigid parts")
+    rigid: dict[str, RigidInput] = Field({}, description="`[solid.rigid.NAME]`: rigid bodies that forces move")
+    obstacles: dict[str, ObstacleInput] = Field(
+        {}, description="`[solid.obstacles.NAME]`: rigid parts that stand or go as told"
+    )
     tied: tuple[tuple[str, ...], ...] = Field(
         (), description="lists of names of bodies that hold together where they touch, by bonds or as one material"
     )
@@ -265,6 +236,9 @@ class SolidInput(Table):
         "away, against clumping; 0.3 is usual, 0 is none",
     )
     friction: quantity("1", ge=0.0, le=2.0) = Field(0.0, description="Coulomb's coefficient between bodies that meet")
+    wall_friction: quantity("1", ge=0.0, le=2.0) = Field(
+        0.0, description="Coulomb's coefficient between bodies and walls of the domain"
+    )
     objective_rate: description.ObjectiveRate = Field(
         "jaumann", description="axes in which stresses are kept turn with the vorticity, or with the polar rotation"
     )

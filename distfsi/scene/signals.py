@@ -186,7 +186,9 @@ def _solid_rate(scene: Scene) -> float:
     """1/dt [1/s] of the body that needs the shortest steps; 0 without one."""
     if scene.solid is None or scene.solid.obstacles:
         return 0.0
-    return max((solid_rate(scene, body) for body in scene.solid.bodies), default=0.0)
+    bodies = scene.solid.bodies
+    meets = len(bodies) > 1 or any("wall" in ends for ends in scene.domain.boundaries)
+    return max((solid_rate(scene, body) for body in bodies if meets or not body.motion), default=0.0)
 
 
 def fluid_rate(scene: Scene, layout: Layout) -> float:

@@ -57,6 +57,21 @@ def vector(unit: str) -> Any:
     return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(shown)]
 
 
+def turn(unit: str) -> Any:
+    """Type of what a turn has: in 2D a number in `unit`, in 3D a list of three; in 1D nothing turns."""
+
+    def convert(value: Any, info: ValidationInfo) -> tuple[float, ...]:
+        entries = value if isinstance(value, list) else [value]
+        dimensions = (info.context or {}).get("dimensions")
+        wanted = len(entries) if dimensions is None else (0, 1, 3)[dimensions - 1]
+        if len(entries) != wanted:
+            raise ValueError(f"has {len(entries)} entries, needs {wanted} in {dimensions}D")
+        return tuple(to_si(entry, unit) for entry in entries)
+
+    shown = {"type": ["array", "number", "string"], "items": {"type": ["number", "string"]}, "unit": unit}
+    return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(shown)]
+
+
 def counts(minimum: int) -> Any:
     """Type of a list of one to three whole numbers from `minimum` on; in 1D also a single number."""
     number = Annotated[int, Field(strict=True, ge=minimum, le=LARGEST_COUNT)]

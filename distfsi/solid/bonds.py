@@ -19,7 +19,7 @@ from distfsi.mesh.kernels.particles import IMAGES
 from distfsi.mesh.particles import GhostPlan, Key, ParticleExchange
 from distfsi.scene.description import Solid
 from distfsi.solid.kernels import bonds as kernels
-from distfsi.solid.kernels.records import NEVER_BONDED, Bodies, Bonds, Fit, Particles
+from distfsi.solid.kernels.records import NEVER_BONDED, RIGID, Bodies, Bonds, Fit, Particles
 from distfsi.solid.neighbours import NeighbourSearch
 from distfsi.solid.sides import Sides
 
@@ -51,7 +51,9 @@ class BondNetwork:
     ):
         """The bodies of the `scene` whose form is not the total Lagrangian one get no bonds."""
         device, spacing = exchange.device, np.array([body.spacing for body in scene.bodies])
-        self._bonded = np.array([scene.form_of(body) == "total_lagrangian" for body in scene.bodies])
+        forms = [scene.form_of(body) for body in scene.bodies]
+        self._bonded = np.array([form == "total_lagrangian" for form in forms])
+        self._unbonded = np.array([RIGID if form == "rigid" else NEVER_BONDED for form in forms])
         self._kernels, self._rows, self._device = kernels, exchange.rows, device
         self._search, self._communicator, self._sides = search, communicator, sides
         self._dimensions = exchange.blocks.grid.dimensions
@@ -83,7 +85,7 @@ class BondNetwork:
         keys = np.concatenate([np.empty((0, width), dtype=np.int64), *padded])
         c["bonds"] = np.where(keys == NONE, -1, keys)
         count = np.count_nonzero(c["bonds"] >= 0, axis=1)
-        c["bond_count"] = np.where(self._bonded[c["body"]], count, NEVER_BONDED)
+        c["bond_count"] = np.where(self._bonded[c["body"]], count, self._unbonded[c["body"]])
 
     def _neighbours(
         self, c: Columns, exchange: ParticleExchange

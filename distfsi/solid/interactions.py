@@ -12,6 +12,7 @@ from distfsi.scene.description import Scene
 from distfsi.solid.contact import Contact
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.neighbours import NeighbourSearch
+from distfsi.solid.no_forces import NoForces
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
 from distfsi.solid.total_lagrangian import TotalLagrangian
@@ -28,9 +29,12 @@ def form_of(
     sides: Sides,
 ) -> SolidForm:
     """How particles of one side do."""
+    forms = {present(scene.solid).form_of(body) for body in present(scene.solid).bodies}
+    if forms == {"rigid"}:
+        return NoForces(exchange.device)
     solid, domain, device = present(scene.solid), scene.domain, exchange.device
     search = NeighbourSearch(kernels, device, domain.lower, domain.upper)
-    if any(solid.form_of(body) == "total_lagrangian" for body in solid.bodies):
+    if forms != {"updated_lagrangian"}:
         return TotalLagrangian(kernels, exchange, search, communicator, solid, points, sides, domain.dimensions)
     repels = solid.artificial_stress > 0.0
     return UpdatedLagrangian(kernels, device, search, sides, domain.dimensions, repels)
@@ -41,8 +45,9 @@ def contacts_of(
 ) -> list[Contact | Walls]:
     """What bodies run into: other sides, and walls of the domain."""
     domain, device = scene.domain, exchange.device
-    walled = any("wall" in ends for ends in domain.boundaries)
-    walls: list[Contact | Walls] = [Walls(kernels, device, domain)] if walled else []
+    walls: list[Contact | Walls] = []
+    if any("wall" in ends for ends in domain.boundaries):
+        walls = [Walls(kernels, device, exchange.rows, domain, exchange.blocks.local_count)]
     if not sides.meet:
         return walls
     cells = CellSort(kernels, device, domain.lower, domain.upper)

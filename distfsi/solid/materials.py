@@ -22,6 +22,7 @@ from distfsi.solid.kernels.records import LawTables, RestState
 
 SCATTER = Column("strength_scatter", "1", "factor of the strength of the particle", initial=1.0, written=False)
 PRESSURE = Column("pressure", "Pa", "pressure that is carried")
+RIGID = -1  # in the place of the number of a material
 MINIMUM_MODULUS = 0.1  # of the bulk modulus at rest, which expanded hot material keeps
 
 
@@ -87,7 +88,7 @@ class Materials:
     """The materials of a solid.
 
     materials  without repetition, in the order of the bodies
-    number     (bodies,) which of them each body has
+    number     (bodies,) which of them each body has; RIGID: none, it does not deform
     rest       of each body, on the host
     constants  what all kernels of the solid are specialised for
     columns    what particles remember, of all materials; a particle of another material keeps what it had at the start
@@ -95,9 +96,9 @@ class Materials:
 
     def __init__(self, solid: Solid, dimensions: int):
         self.bodies, self.dimensions = solid.bodies, dimensions
-        of_bodies = [Material.of(body) for body in solid.bodies]
-        self.materials = tuple(dict.fromkeys(of_bodies))
-        self.number = np.array([self.materials.index(material) for material in of_bodies])
+        of_bodies = [None if body.motion else Material.of(body) for body in solid.bodies]
+        self.materials = tuple(material for material in dict.fromkeys(of_bodies) if material)
+        self.number = np.array([self.materials.index(each) if each else RIGID for each in of_bodies])
         self.rest = rest_state(solid.bodies, crack_width(solid.smoothing, dimensions))
         self.columns = self._columns()
         names = {column.name for column in self.columns}
@@ -116,7 +117,7 @@ class Materials:
         """The numbers of the laws; rows of bodies of other materials hold nothing."""
         numbers = [np.full((len(self.bodies), len(fields(law))), np.nan) for law in material.laws.values()]
         for b, body in enumerate(self.bodies):
-            if self.materials[self.number[b]] == material:
+            if self.number[b] == self.materials.index(material):
                 for name, table in zip(material.laws, numbers, strict=True):
                     table[b] = numbers_of(getattr(body, name))
         return LawTables(*numbers, *[np.empty((len(self.bodies), 0))] * (len(LawTables._fields) - len(numbers)))

@@ -8,50 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from distfsi.device.interface import Columns
 from distfsi.mesh.blocks import Snapshot
-from distfsi.mesh.particles import ParticleExchange
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
 from distfsi.scene.motion import Motion
 from distfsi.solid.contact import Contact
-from distfsi.solid.neighbours import Near
+from distfsi.solid.no_forces import NoForces
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.solid import Solid
 from distfsi.solid.walls import Walls
 
 REFERENCE = "reference"  # [m] of the points at the start
-
-
-class NoForces:
-    """The form (solid/protocol.py) of bodies whose points do not act on each other."""
-
-    def bind(self, columns: Columns, exchange: ParticleExchange) -> None:
-        """They need no columns."""
-
-    def flags(self, columns: Columns) -> list[float]:
-        """Nothing to tell."""
-        return []
-
-    def requested_keys(self, columns: Columns) -> np.ndarray | None:
-        """Of no others."""
-        return None
-
-    def ghost_payload(self, columns: Columns) -> list[Any]:
-        """Nothing."""
-        return []
-
-    def accelerate(self, columns: Columns, near: Near, acceleration: Any, limits: Any) -> None:
-        """Not at all."""
-
-    def strain(self, columns: Columns, near: Near, dt: float, velocity: Any, gradient: Any) -> None:
-        """Not at all."""
-
-    def resume(self) -> None:
-        """Nothing to find again."""
-
-    def label_pieces(self, columns: Columns, exchange: ParticleExchange) -> None:
-        """There are none."""
 
 
 class Obstacles(Solid):
@@ -62,7 +29,9 @@ class Obstacles(Solid):
 
     def __init__(self, scene: Scene, *parts: Any):
         motions = [body.motion for body in present(scene.solid).bodies]
-        self._motions = {b: motion for b, motion in enumerate(motions) if motion is not None}
+        self._motions = {
+            b: motion for b, motion in enumerate(motions) if isinstance(motion, Motion) and not motion.stands
+        }
         self.stands = not self._motions
         self._time = 0.0
         super().__init__(scene, *parts)
@@ -72,7 +41,7 @@ class Obstacles(Solid):
         if not self.stands:
             self.columns[REFERENCE] = self.columns["position"].copy()
         self._hold()
-        return NoForces(), ()
+        return NoForces(self.device), ()
 
     def _hold(self) -> None:
         """The step begins here."""

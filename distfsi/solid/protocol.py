@@ -54,7 +54,8 @@ class SolidForm(Protocol):
 class Structure(Protocol):
     """What makes a wall: surface points with mass that are advanced, and that take an impulse of the fluid. The order
     of calls in a step (distfsi/step.py): prepare(), time_step() and advance() in each sub-step, apply_impulse(),
-    migrate(). There are deformable particles (solid/solid.py) and obstacles (solid/obstacles.py). Arrays are the
+    migrate(). There are deformable particles (solid/solid.py), rigid bodies among them (solid/with_rigid.py), and
+    obstacles (solid/obstacles.py). Arrays are the
     device's, of this rank's `count` points.
 
     communicator  of all ranks
@@ -105,6 +106,12 @@ class Structure(Protocol):
 
     def advance(self, dt: float) -> None:
         """Collective, after prepare(). Advance by `dt` [s] without the fluid."""
+
+    def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
+        """Collective, after advance(). What of the fluid's push goes to rigid bodies, and what to the fluid that goes
+        along with them (docs/theory.md: light bodies). The points, of a `mass` (own,) [kg] as wall, have `gained`
+        (own, 1 + D) velocity [m/s] and added mass over their own. Returns the `impulse` (own, D) [N s], and what is
+        `shared` (own, D) [m/s] per added mass, of all points, from what they are where each acts for itself."""
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance(). The fluid gives `impulse` (own, D) [N s]. Returns by how much (own, D) [m/s] the velocity at

@@ -15,11 +15,12 @@ ON_THE_PLANE = 0.75  # spacings: a body whose particles come so close to a symme
 
 
 class Sides:
-    """A body is a side, with all that are tied to it, and its mirror image is another one behind a symmetry plane that
-    it does not go through.
+    """A body is a side, with all that are tied to it, and its image is another one behind a symmetry plane or periodic
+    end that it does not go through. What no bonds hold together is not told from its image beyond a periodic end.
 
     bodies  how many there are: a side is the number of its first body, for an image behind such a plane so many more
     meet    whether there are different sides
+    continued  (bodies,) the axes, as bits, whose symmetry planes or periodic ends a body goes through
     """
 
     def __init__(self, scene: Solid, columns: Columns, exchange: ParticleExchange, communicator: Communicator):
@@ -29,13 +30,16 @@ class Sides:
         self._end = np.cumsum(np.sum(counts, axis=0))  # of the ids of each body
         spacing, planes = np.array([body.spacing for body in scene.bodies]), exchange.planes()
         touching = np.zeros((self.bodies, c["position"].shape[1]))
-        for axis, plane in planes:
-            close = np.abs(c["position"][:, axis] - plane) < ON_THE_PLANE * spacing[c["body"]]
-            touching[c["body"][close], axis] = 1.0
+        unbonded = [scene.form_of(body) == "updated_lagrangian" for body in scene.bodies]
+        for plane in planes:
+            close = np.abs(c["position"][:, plane.axis] - plane.end) < ON_THE_PLANE * spacing[c["body"]]
+            touching[c["body"][close], plane.axis] = 1.0
+            if plane.shift:
+                touching[unbonded, plane.axis] = 1.0
         touching = communicator.maximum(touching.ravel()).reshape(touching.shape)
-        self._continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
+        self.continued = (touching.astype(np.int64) << np.arange(touching.shape[1])).sum(axis=1)
         self._first = np.array(scene.first_tied)
-        self.meet = bool(self._first.any() or any(not touching[:, axis].all() for axis, _ in planes))
+        self.meet = bool(self._first.any() or any(not touching[:, plane.axis].all() for plane in planes))
         self._device = exchange.device
         self._key: Key | None = None
         self._side: DualArray | None = None
@@ -44,7 +48,7 @@ class Sides:
         """The side (count,) of particles, ghosts and images with these keys."""
         if key is not self._key:
             body = self.body_of(key.host)
-            beyond = key.host % IMAGES & ~self._continued[body] > 0
+            beyond = key.host % IMAGES & ~self.continued[body] > 0
             self._key, self._side = key, DualArray(self._device, self._first[body] + self.bodies * beyond)
         return present(self._side)
 

@@ -25,7 +25,7 @@ from distfsi.mesh.particles import ParticleExchange
 from distfsi.mesh.rows import Groups
 from distfsi.narrowing import present
 from distfsi.scene.description import Scene
-from distfsi.solid import contact, fields, neighbours, pieces, total_lagrangian, updated, walls
+from distfsi.solid import contact, fields, neighbours, open_ends, total_lagrangian, updated, walls
 from distfsi.solid.contact import Contact
 from distfsi.solid.formulas.stress import von_mises
 from distfsi.solid.interactions import contacts_of, form_of
@@ -34,9 +34,12 @@ from distfsi.solid.kernels.records import VELOCITY
 from distfsi.solid.material_points import MaterialGroups
 from distfsi.solid.materials import Materials
 from distfsi.solid.neighbours import Near
+from distfsi.solid.open_ends import OpenEnds
 from distfsi.solid.packed import packed
+from distfsi.solid.periodic import PeriodicEnds
 from distfsi.solid.protocol import SolidForm
 from distfsi.solid.sides import Sides
+from distfsi.solid.totals import Totals
 from distfsi.solid.walls import Walls
 
 DRIVERS = (
@@ -52,11 +55,12 @@ DRIVERS = (
     *total_lagrangian.DRIVERS,
     *contact.DRIVERS,
     *walls.DRIVERS,
+    *open_ends.DRIVERS,
 )
 LIMITS = ("sound", "acceleration")  # what bounds the time step, columns of `_limits`
 
 
-class Solid:
+class Solid(Totals):
     """All particles of this rank. A step is prepare(), time_step(), advance(dt), apply_impulse(impulse), migrate(); of
     these a sub-step is the first three.
 
@@ -88,6 +92,10 @@ class Solid:
         self._points = MaterialGroups(self.materials, device, constants)
         self._von_mises = plain(von_mises, constants)
         self.exchange = ParticleExchange(blocks, device, self.kernels)
+        self._open = OpenEnds(self.kernels, device, communicator, scene.domain)
+        self._rigid = np.array([body.motion is not None for body in solid.bodies])
+        self._periodic = PeriodicEnds(self.kernels, device, communicator, scene.domain)
+        self._support = 2.0 * solid.smoothing * max(body.spacing for body in solid.bodies)  # at the start [m]
         # Sums over all steps, and of the last one.
         self._boundary_impulse = np.zeros((blocks.local_count, D))
         self._gravity_work = np.zeros(blocks.local_count)
@@ -108,12 +116,13 @@ class Solid:
         self.columns = Columns(device, c | self.materials.initial(c["body"], c["id"], c["mass"] / c["density"]))
         self.migrate()
         self.form, self._contacts = self._begin(scene)
+        self._walls = next((met for met in self._contacts if isinstance(met, Walls)), None)
 
     def _begin(self, scene: Scene) -> tuple[SolidForm, Sequence[Contact | Walls]]:
         """Collective. What materials and bonds find before the first step; how particles act on each other, and what
         bodies run into."""
         self._points.deform(self.columns, 0.0, self.device.zeros((self.count, self.dimensions**2)))
-        sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
+        self.sides = sides = Sides(self._scene, self.columns, self.exchange, self.communicator)
         given = (scene, self.kernels, self.exchange, self.communicator)
         form, contacts = form_of(*given, self._points, sides), contacts_of(*given, sides)
         form.bind(self.columns, self.exchange)
@@ -133,6 +142,7 @@ class Solid:
             "SMOOTHING_RATIO": solid.smoothing,
             "ARTIFICIAL_STRESS": solid.artificial_stress,
             "FRICTION": solid.friction,
+            "WALL_FRICTION": solid.wall_friction,
             "ZERO_ENERGY": solid.zero_energy,
         } | self.materials.constants
 
@@ -149,15 +159,23 @@ class Solid:
 
         `around` then holds all particles within `reach` [m], or farther, of this rank's blocks. `goes_on`: a step that
         has begun goes on with another sub-step; `stray` [m]: how far particles go between two calls of migrate(), if
-        there are such. Raises Diverged on all ranks when a smoothing length is not finite.
+        there are such. What has left the domain is let go before a step. Raises Diverged on all ranks when a smoothing
+        length is not finite.
         """
-        c, device, own = self.columns, self.device, self.count
+        c, device = self.columns, self.device
+        passed = np.empty(0, dtype=np.int64)
+        if self._open.there and not goes_on:
+            passed = self._open.passed(c, max(reach, self._support))
+            passed = passed[~self._rigid[c["body"][passed]]]  # these go on: all of a body, or nothing, moves
         (h,) = c.read("h")
         largest = self.exchange.rows.largest(h, 0.0)
-        maxima = self.communicator.maximum(np.array([largest, *self.form.flags(c)]))
-        support, flags = 2.0 * maxima[0], maxima[1:]
+        maxima = self.communicator.maximum(np.array([largest, len(passed), *self.form.flags(c)]))
+        support, flags = 2.0 * maxima[0] or self._support, maxima[2:]
         if not np.isfinite(support):
             raise Diverged("solid: a smoothing length is not finite")
+        if maxima[1]:
+            self._let_go(passed)
+        own = self.count
         state, parity = device.empty((own, VELOCITY + self.dimensions)), ((),) * VELOCITY
         device.run(self.kernels.pack_state, own, *c.read("mass", "density", "h", "sound_speed", "velocity"), state)
         (now,) = c.read("position")
@@ -210,6 +228,8 @@ class Solid:
         sums = self._per_body(budget).sum(axis=1)
         self._gravity_work += sums[:, motion.WORK]
         self._boundary_impulse += sums[:, motion.IMPULSE :]
+        if self._walls:
+            self._walls.account(dt, lambda load: self._per_body(load).sum(axis=1))
 
     def drift(self, dt: float) -> None:
         """Collective, after kick(). Strain and move the particles by `dt` [s] of their new velocities."""
@@ -222,10 +242,15 @@ class Solid:
             met.heat(c, self.around, dt, around)
         self._points.deform(c, dt, gradient)
         moved = device.empty((self.count, D))
-        self._run(self.kernels.move, dt, velocity, *c.read("position"), moved)
+        going = self._going(dt)
+        self._run(self.kernels.move, dt, going, *c.read("position"), moved)
         c.adopt("position", moved)
         self.sub_steps += 1
-        self._run(self.kernels.average_velocity, self.sub_steps, velocity, self.carried)
+        self._run(self.kernels.average_velocity, self.sub_steps, going, self.carried)
+
+    def _going(self, dt: float) -> Any:
+        """The velocity (own, D) [m/s] with which particles go on for `dt` [s]."""
+        return self.columns.read("velocity")[0]
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). The fluid gives `impulse` (own, D) [N s], an array of the device.
@@ -243,11 +268,41 @@ class Solid:
         self._boundary_impulse += sums[:, 2:]
         return excess
 
+    def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
+        """See solid/protocol.py: each particle has shared for itself."""
+        return impulse, shared
+
     def migrate(self) -> None:
-        """Collective. Give the particles that left this rank's blocks to their new owners."""
+        """Collective. Carry round what is beyond periodic ends, and give the particles that left this rank's blocks to
+        their new owners."""
+        if self._periodic.there and self._periodic.passed(self.columns):
+            self.label_pieces()
+            self._periodic.carry(self.columns)
         home = self.exchange.migrate(self.columns, self._home)
-        if home is self._home:
+        if home is not self._home:
+            self._settle(home)
+
+    def _let_go(self, passed: np.ndarray) -> None:
+        """Collective. Of the rows that have `passed` an end forget those that have left; what they carry has left."""
+        self.label_pieces()
+        left = self._open.left(self.columns, passed)
+        if not len(left):
             return
+        c, gone = self.columns, np.zeros((self.count, 1))
+        gone[left] = 1.0
+        mass, velocity = gone * c["mass"][:, None], c["velocity"]
+        energy = mass * (0.5 * (velocity**2).sum(axis=1, keepdims=True) + c["energy"][:, None])
+        sums = self._per_body(self.device.array(np.hstack([energy, mass * velocity]))).sum(axis=1)
+        self._gravity_work -= sums[:, 0]
+        self._boundary_impulse -= sums[:, 1:]
+        home, stays = present(self._home).host(), np.flatnonzero(gone == 0.0)
+        rows = self.device.array(stays)
+        for name in c:
+            c.adopt(name, self.exchange.rows.taken(c.read(name)[0], rows))
+        self._settle(DualArray(self.device, home[stays]))
+
+    def _settle(self, home: DualArray) -> None:
+        """Particles have come or gone: `home` (own,) are their blocks now."""
         self._home, bodies = home, self.given.shape[1]
         self._points.select(self.columns["body"])
         self._block = home.host() - self.blocks.first
@@ -263,23 +318,10 @@ class Solid:
         if shown:
             self._shown.append(name)
 
-    def _sorted(self, *names: str) -> dict[str, np.ndarray]:
-        """The columns of these names by (block, body, id), an order that depends on nothing else."""
-        return {name: self.columns[name][self._order] for name in names}
-
     def _run(self, kernel: Any, *arguments: Any) -> None:
         self.device.run(kernel, self.count, *arguments)
 
-    # ---- totals and output ------------------------------------------------------------------------------------------
-
-    @property
-    def count(self) -> int:
-        """Number of this rank's particles."""
-        return self.columns.read("id")[0].shape[0]
-
-    def _per_body(self, values: Any) -> np.ndarray:
-        """Sums (local blocks, bodies, k) of `values` (own, k) on the device, in the order of the particles' ids."""
-        return present(self._groups).sums(values).reshape(*self.given.shape[:2], values.shape[1])
+    # ---- state and output -------------------------------------------------------------------------------------------
 
     @property
     def around(self) -> Near:
@@ -295,56 +337,11 @@ class Solid:
             state = ", ".join(f"{name} {c[name][broken[0]]}" for name in names)
             raise Diverged(f"{self._name(broken[0])} has no valid state at t = {time:.6g} s: {state}")
 
-    def totals(self) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], momentum (D,) [N s], kinetic and internal energy [J] of all particles of all ranks;
-        acoustic [N s]: their momentum at the speed of sound."""
-        c = self.columns
-        mass, velocity = c["mass"], c["velocity"]
-        kinetic = 0.5 * mass * (velocity**2).sum(axis=1)
-        sums = (mass, kinetic, mass * c["energy"], mass * c["sound_speed"])
-        values = np.column_stack([*sums, mass[:, None] * velocity])
-        total = self.blocks.sum(self._per_body(self.device.array(values)).sum(axis=1))
-        return dict(zip(("mass", "kinetic", "internal", "acoustic"), total, strict=False)) | {"momentum": total[4:]}
-
-    def body_totals(self, body: int) -> dict[str, np.ndarray]:
-        """Collective. mass [kg], center of mass (D,) [m], momentum (D,) [N s] of a body, and the impulse (D,) [N s]
-        that the fluid gave to it in the last step."""
-        c, D = self.columns, self.dimensions
-        mass = c["mass"][:, None]
-        values = np.hstack([mass, mass * c["position"], mass * c["velocity"]])
-        amounts = self._per_body(self.device.array(values))
-        total = self.blocks.sum(np.hstack([amounts[:, body], self.given[:, body]]))
-        mass, first_moment, momentum, impulse = np.split(total, [1, 1 + D, 1 + 2 * D])
-        return {"mass": mass, "center": first_moment / mass, "momentum": momentum, "impulse": impulse}
-
-    def pieces(self) -> dict[str, np.ndarray] | None:
-        """Collective. The pieces that intact bonds hold together: see solid/pieces.py; None without bonds."""
-        self.label_pieces()
-        if "piece" not in self.columns:
-            return None
-        c, bonded = self._sorted("piece", "mass", "position", "velocity"), self.columns["piece"][self._order] >= 0
-        c = {name: column[bonded] for name, column in c.items()}
-        return pieces.table(c, self._block[self._order][bonded], self.blocks)
-
-    def label_pieces(self) -> None:
-        """Collective. Bring the pieces that particles belong to up to date, for outputs()."""
-        self.form.label_pieces(self.columns, self.exchange)
-
-    def boundary_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D,) [N s] given by symmetry planes, fixed particles and gravity since the start."""
-        return self.blocks.sum(self._boundary_impulse)
-
-    def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start."""
-        return self.blocks.sum(self._gravity_work[:, None])[0]
-
-    def workload(self) -> np.ndarray:
-        """(local blocks,) particles."""
-        return np.bincount(self._block, minlength=self.blocks.local_count).astype(float)
-
     def snapshot(self) -> Snapshot:
         """What a restart needs."""
         sums = {"boundary_impulse": self._boundary_impulse, "gravity_work": self._gravity_work}
+        if self._walls:
+            sums["wall_impulse"] = self._walls.impulse
         return {"particles": self._sorted(*self.columns), "sums": sums}
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -356,6 +353,8 @@ class Solid:
         self.form.resume()
         self._boundary_impulse[:] = snapshot["sums"]["boundary_impulse"]
         self._gravity_work[:] = snapshot["sums"]["gravity_work"]
+        if self._walls:
+            self._walls.impulse[:] = snapshot["sums"]["wall_impulse"]
 
     def outputs(self, chosen: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """This rank's particles for a field file (solid/fields.py); `chosen`: the rows wanted, by default all, by

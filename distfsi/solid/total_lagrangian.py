@@ -23,7 +23,7 @@ from distfsi.solid.kernels import bonds as kernels
 from distfsi.solid.kernels import cracks, motion
 from distfsi.solid.kernels.records import (
     CRACK,
-    NEVER_BONDED,
+    RIGID,
     BondedMaterial,
     BondedPoint,
     Bonds,
@@ -75,7 +75,7 @@ class TotalLagrangian:
     detaching            (n,) 1 when the particle leaves its bonds in the next step
     exposed              (n,) 1 when it lies at a surface
     velocity_gradient    (n, D D) that of the last step [1/s], of particles of bodies in the updated form, if there are
-                         such; their bond_count is NEVER_BONDED and their piece -1
+                         such; their bond_count is NEVER_BONDED, or RIGID, and their piece -1
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class TotalLagrangian:
         self._kernels, self._rows, self._device = kernels, exchange.rows, exchange.device
         self._communicator, self._materials, self._dimensions = communicator, materials, dimensions
         self._network = BondNetwork(kernels, exchange, search, communicator, scene, sides)
-        self._mixed = any(scene.form_of(body) != "total_lagrangian" for body in scene.bodies)
+        self._mixed = any(scene.form_of(body) == "updated_lagrangian" for body in scene.bodies)
         repels = scene.artificial_stress > 0.0
         self._unbonded = UpdatedLagrangian(kernels, self._device, search, sides, dimensions, repels)
         self._self_contact = SelfContact(kernels, self._rows, search, sides, dimensions)
@@ -122,7 +122,8 @@ class TotalLagrangian:
         fit, moments = network.fit(n, device.array(np.arange(n)), bonds, reference, at_rest)
         c.adopt("correction", fit.correction)
         c.adopt("deformation", fit.deformation)
-        c["exposed"] = (device.download(moments)[:, 0] < kernels.EXPOSED_BELOW).astype(np.int64)
+        exposed = device.download(moments)[:, 0] < kernels.EXPOSED_BELOW
+        c["exposed"] = (exposed & (c["bond_count"] != RIGID)).astype(np.int64)
         self.label_pieces(c, exchange)
 
     def resume(self) -> None:
@@ -144,7 +145,7 @@ class TotalLagrangian:
             second = order[np.searchsorted(id, partners[first, index] // IMAGES, sorter=order)]
             links.append(np.stack([begin + first, second])[:, begin + first < second])  # each bond once
         found = pieces.label(id, np.concatenate(links, axis=1), plan, self._device, self._communicator)
-        c["piece"] = np.where(c["bond_count"] == NEVER_BONDED, -1, found)
+        c["piece"] = np.where(c["bond_count"] < 0, -1, found)
 
     # ---- what ghosts must know ---------------------------------------------------------------------------------------
 

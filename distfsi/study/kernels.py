@@ -9,8 +9,9 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -123,6 +124,11 @@ class Listening(Cpu):
 
 def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     """The kernels that a scene builds, and those that a step of it calls, whatever comes out of them."""
+    with TemporaryDirectory() as directory:  # gauges write what they see
+        return _inventory(replace(scene, output=replace(scene.output, directory=directory)), communicator)
+
+
+def _inventory(scene: Scene, communicator: Communicator) -> Inventory:
     gpu = Inventory()
     simulation = Simulation.of(scene, communicator, device=gpu)
     fluid, solid, coupling = simulation.fluid, simulation.solid, simulation.coupling
@@ -177,17 +183,17 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
     """Each text of all kernels of all scenes, once, in the order of scenes; without kernels that no scene calls."""
     debris = calls_of_debris(communicator) if any(scene.solid for scene in scenes.values()) else {}
     found = [(name, scene, inventory(scene, communicator)) for name, scene in scenes.items()]
-    known: dict[tuple[str, Callable], Calls] = {}
+    known: dict[tuple, Calls] = {}
     for _, scene, gpu in found:
         for key, call in {**debris, **gpu.calls}.items():
-            known.setdefault((precision(scene), key[0]), {})[key] = call
+            known.setdefault((precision(scene), *takes(call[0])), {})[key] = call
     texts: dict[str, Text] = {}
     written: dict[tuple, str] = {}  # by all that a text depends on
     for name, scene, gpu in found:
         called = {id(kernel) for kernel, _ in gpu.calls.values()}
         others = [kernel for kernel in gpu.built if id(kernel) not in called]
         calls = [*gpu.calls.values()]
-        shown = [(kernel, known.get((precision(scene), kernel.driver), {})) for kernel in others]
+        shown = [(kernel, known.get((precision(scene), *takes(kernel)), {})) for kernel in others]
         calls += [(kernel, arguments) for kernel, ones in shown for _, arguments in ones.values()]
         for kernel, arguments in calls:
             given = kernel.given(arguments)
@@ -196,6 +202,12 @@ def texts(scenes: Mapping[str, Scene], communicator: Communicator) -> dict[str, 
             of = texts.setdefault(text, Text(kernel, given, scene.domain.dimensions, {}))
             of.scenes[name] = None
     return texts
+
+
+def takes(kernel: Kernel) -> tuple[Callable, frozenset]:
+    """What says which arguments a kernel takes: its driver, and the fields of the records that a scene gives it."""
+    records = {(name, given) for name, given in kernel.bindings.items() if isinstance(given, type)}
+    return kernel.driver, frozenset((name, getattr(record, "_fields", record)) for name, record in records)
 
 
 def precision(scene: Scene) -> str:

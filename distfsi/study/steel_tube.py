@@ -15,12 +15,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.charts import Chart, Curve, draw_charts
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.shipped import shipped_inputs
 from distfsi.study.references import STEEL_TUBE, STEEL_TUBE_JOHNSON_COOK, STEEL_TUBE_PLASTIC, TubeStrength

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.charts import Chart, Curve, Picture, draw_charts, draw_pictures
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.study.references import TUBE_FRAGMENTS
 from distfsi.study.steel_tube import INPUT, WIDE

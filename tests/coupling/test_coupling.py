@@ -188,5 +188,5 @@ def one_rank():
 
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.full)])
 def test_same_bits_on_any_number_of_ranks_and_threads_and_for_any_blocks(one_rank, ranks):
-    assert one_rank.count("\n") == 6
+    assert one_rank.count("\n") == 7
     assert run_ranks(ranks, ["tests/support/mpi_coupling.py"], 300) == one_rank

@@ -59,8 +59,8 @@ def _name(module) -> str:
 
 
 def write_scene(path, dimensions: int, phases: dict[str, str], precision: str, scheme: str, form: str):
-    """A ball of steel, fast and thick, a thin light plate and a lone particle in a box of gas: cells get covered, deep
-    and fresh."""
+    """A ball of steel, fast and thick, a thin light plate and a lone particle at a wall in a box of gas: cells get
+    covered, deep and fresh."""
     D = dimensions
     path.write_text(
         f"""
@@ -80,6 +80,7 @@ pressure = "2 GPa"
 [solid]
 form = "{form}"
 friction = 0.3
+wall_friction = 0.3
 {"artificial_stress = 0.3" if D == 3 and form == "updated_lagrangian" else ""}
 [solid.bodies.ball]
 shape = {{ kind = "ball", center = {["8 mm"] * D}, radius = "5 mm" }}
@@ -91,9 +92,9 @@ shape = {{ kind = "box", lower = {["1.4 mm", *["2 mm"] * (D - 1)]}, upper = {["2
 spacing = "0.7 mm"
 {STEEL.replace("7830", "300" if scheme != "immersed_boundary" else "7830")}
 [solid.bodies.speck]
-shape = {{ kind = "box", lower = {["14 mm"] * D}, upper = {["14.7 mm"] * D} }}
+shape = {{ kind = "box", lower = {["15.3 mm", *["14 mm"] * (D - 1)]}, upper = {["16 mm", *["14.7 mm"] * (D - 1)]} }}
 spacing = "0.7 mm"
-velocity = {[-500, 0, 0][:D]}
+velocity = {[500, 0, 0][:D]}
 {STEEL}
 """
     )

@@ -14,9 +14,9 @@ from distfsi.device import cuda, host
 from distfsi.device.gpu import Gpu
 from distfsi.device.host import HostArray, HostRuntime
 from distfsi.errors import InputError
+from distfsi.execution import gpu_of_rank, run
 from distfsi.mesh.communicator import Communicator
 from distfsi.resources import works
-from distfsi.run import gpu_of_rank, run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from launch import ROOT, SUPPORT
@@ -43,7 +43,7 @@ def test_a_coupled_scene_has_the_bits_of_the_cpu(mpiexec):
 @pytest.mark.full
 def test_a_run_leaves_the_files_of_the_cpu(monkeypatch, tmp_path):
     """Bonded particles in a fluid."""
-    monkeypatch.setattr("distfsi.run.gpu_of", lambda rank, direct: Gpu(HostRuntime()))
+    monkeypatch.setattr("distfsi.execution.gpu_of", lambda rank, direct: Gpu(HostRuntime()))
     changes = (*mpi_gpu.COARSE, "solid.form=total_lagrangian", "output.schlieren=true", "time.maximum_steps=8")
     for name in ("cpu", "gpu"):
         given = (*changes, "output.fields_every=3e-7", f'output.directory="{tmp_path / name}"')
@@ -168,9 +168,9 @@ def test_a_message_arrives_or_does_not(monkeypatch):
 @pytest.mark.parametrize(("why", "arrives", "fault"), [("no", True, "no"), ("", False, "otherwise"), ("", True, "")])
 def test_messages_of_a_gpus_memory_are_asked_for_and_tried(monkeypatch, why, arrives, fault):
     gpu = Gpu(HostRuntime(), direct=True)
-    monkeypatch.setattr("distfsi.run.gpu_of", lambda rank, direct: gpu)
-    monkeypatch.setattr("distfsi.run.refusal", lambda communicator: why)
-    monkeypatch.setattr("distfsi.run.arrives", lambda communicator, gpu: arrives)
+    monkeypatch.setattr("distfsi.execution.gpu_of", lambda rank, direct: gpu)
+    monkeypatch.setattr("distfsi.execution.refusal", lambda communicator: why)
+    monkeypatch.setattr("distfsi.execution.arrives", lambda communicator, gpu: arrives)
     if fault:
         with pytest.raises(InputError, match=f"--gpu-aware-mpi: .*{fault}"):
             gpu_of_rank(Communicator(), direct=True)

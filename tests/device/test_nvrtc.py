@@ -21,12 +21,12 @@ def texts_of(*scenes):
 
 
 def check_stage(row):
-    """Nothing is spilled, and of a float32 stage only dt/h and the sums of what leaves the domain's sides are
-    float64."""
+    """Nothing is spilled, and of a float32 stage only dt/h and the sums of what leaves the domain's sides are float64:
+    so many instructions for each axis, whatever the materials."""
     assert row["spill stores"] == row["spill loads"] == row["stack"] == row["local memory"] == 0, row
     assert row["shared memory [B]"] <= SHARED
     if row["real"] == "float32":
-        assert row["float64"] < 60 < row["float32"]
+        assert row["float64"] <= 14 + 18 * row["dimensions"] < row["float32"]
 
 
 @pytest.mark.parametrize(("name", "dimensions", "real"), FEW)

@@ -7,12 +7,12 @@ from distfsi.commands.line import main
 from distfsi.coordinates import coordinates_of
 from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.fluid.mapping import shell_parts
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, series
 from distfsi.output.history import read_history
 from distfsi.output.restart import Restart, newest_restart
-from distfsi.run import run
 from distfsi.scene import load, overlaps
 from distfsi.simulation import Simulation
 from tubes import advance, fields, radii

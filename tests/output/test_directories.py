@@ -12,11 +12,11 @@ from test_kills import contents
 
 from distfsi.commands.line import main
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import manifest
 from distfsi.output.directory import held
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT, SUPPORT
 
@@ -83,7 +83,7 @@ def test_results_are_moved_only_when_the_new_run_can_begin(tmp_path, monkeypatch
     def fails(*_, **__):
         raise MemoryError
 
-    monkeypatch.setattr("distfsi.run.Simulation.of", fails)
+    monkeypatch.setattr("distfsi.execution.Simulation.of", fails)
     with pytest.raises(MemoryError):
         go(tmp_path)
     assert contents(tmp_path) == before

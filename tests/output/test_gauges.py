@@ -13,11 +13,11 @@ from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.sampling import FluidSampler
 from distfsi.diagnostics.schlieren import schlieren
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.gauges import Gauge, TableProbe, each_step
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.law_tables import table_of
 from distfsi.simulation import Simulation
@@ -383,8 +383,8 @@ def test_stress_of_particles(dimensions):
         (["gauges.a={kind='body', body='b'}"], "gauges.a.kind (--set): 'body' needs a solid"),
         (
             ["gauges.a={kind='pont', position=0}"],
-            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'particle', 'plane', 'line'; "
-            "did you mean 'point'?",
+            "gauges.a.kind (--set): \"pont\"; expected one of 'body', 'point', 'surface', 'wall', 'particle', 'plane', "
+            "'line'; did you mean 'point'?",
         ),
         (
             ["gauges.a={kind='point', position=0.5, evry=1}"],

@@ -1,5 +1,6 @@
 """Runs that are killed before their n-th file operation, and at any step on any number of ranks: nothing is lost, and
-what goes on comes to the same bits."""
+what goes on comes to the same bits. `pytest -m full tests/output/test_kills.py --kills 200` kills more often.
+"""
 
 from __future__ import annotations
 
@@ -83,13 +84,19 @@ def put(directory: Path, files: dict[str, bytes]) -> None:
         (directory / name).write_bytes(content)
 
 
+@pytest.fixture
+def more_kills(request):
+    """How many kills were asked for on the command line, 0 if none were."""
+    return request.config.getoption("kills") or 0
+
+
 def points_of(count: int, wanted: int) -> list[int]:
     """So many of the operations, all over the run."""
     return list(range(1, count + 1)) if wanted >= count else sorted(random.sample(range(1, count + 1), wanted))
 
 
-@pytest.mark.parametrize("wanted", [3, pytest.param(40, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
-def test_a_start_upon_earlier_results(tmp_path, wanted):
+@pytest.mark.parametrize("wanted", [3, pytest.param(40, marks=[pytest.mark.full, pytest.mark.timeout(7200)])])
+def test_a_start_upon_earlier_results(tmp_path, wanted, more_kills):
     """Killed at any file operation: each earlier file is in the directory or set aside, bytes as they were; what no run
     has made stays where it is; the next start makes the same results as in an empty directory."""
     directory = tmp_path / "out"
@@ -107,7 +114,7 @@ def test_a_start_upon_earlier_results(tmp_path, wanted):
         assert {name: content for name, content in contents(aside).items() if name != "manifest.jsonl"} == made
         put(directory, earlier)
         count = second.run()[1]
-        points = points_of(count, wanted)
+        points = points_of(count, max(wanted, more_kills))
         for point in points:
             put(directory, earlier)
             assert second.run(point)[0] == -9, point
@@ -124,8 +131,8 @@ def test_a_start_upon_earlier_results(tmp_path, wanted):
     print(f"killed at {len(points)} of {count} operations")
 
 
-@pytest.mark.parametrize("wanted", [2, pytest.param(30, marks=[pytest.mark.full, pytest.mark.timeout(1800)])])
-def test_a_finished_run_that_is_extended(tmp_path, wanted):
+@pytest.mark.parametrize("wanted", [2, pytest.param(30, marks=[pytest.mark.full, pytest.mark.timeout(7200)])])
+def test_a_finished_run_that_is_extended(tmp_path, wanted, more_kills):
     """Killed at any file operation, it goes on in the end to the files of a run that was extended undisturbed."""
     directory = tmp_path / "out"
     with Killed(directory, "none", "time.maximum_steps=2") as first:
@@ -135,7 +142,7 @@ def test_a_finished_run_that_is_extended(tmp_path, wanted):
         code, count = extended.run()
         assert code == 0
         undisturbed = results(directory)
-        points = points_of(count, wanted)
+        points = points_of(count, max(wanted, more_kills))
         for point in points:
             put(directory, finished)
             assert extended.run(point)[0] == -9, point
@@ -146,11 +153,12 @@ def test_a_finished_run_that_is_extended(tmp_path, wanted):
 
 @pytest.mark.parametrize(
     ("steps", "kills"),
-    [(120, 4), pytest.param(600, 30, marks=[pytest.mark.full, pytest.mark.timeout(1800)])],
+    [(120, 4), pytest.param(600, 30, marks=[pytest.mark.full, pytest.mark.timeout(7200)])],
 )
-def test_a_week_in_a_minute(tmp_path, steps, kills):
+def test_a_week_in_a_minute(tmp_path, steps, kills, more_kills):
     """A restart file every ten steps; killed at random moments, each time going on with another number of ranks."""
     script = SUPPORT / "mpi_kills.py"
+    steps, kills = (20 * more_kills, more_kills) if more_kills else (steps, kills)
     settings = (
         *("domain.cells=64", "performance.block_cells=8", "performance.tile_cells=8", "time.cfl=0.05", "time.end=10"),
         *(f"time.maximum_steps={steps}", "output.fields_every=0.01", "output.history_every=7"),

@@ -11,9 +11,9 @@ from distfsi.device.gpu import Gpu, Queue
 from distfsi.device.host import HostRuntime
 from distfsi.device.timers import UNREAD, Timers
 from distfsi.diagnostics.performance import Performance
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.step import parts_of
 from launch import ROOT

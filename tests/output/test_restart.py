@@ -16,13 +16,13 @@ import pytest
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from distfsi.errors import Diverged, InputError, Stopped
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import requests
 from distfsi.output.checksum import add_checksum
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
 from distfsi.output.restart import FORMAT, Restart, newest_restart
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.simulation import Simulation
 from launch import ENVIRONMENT, ROOT, SUPPORT, run_ranks

@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.checksum import BYTES, add_checksum
 from distfsi.output.restart import Restart
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ROOT
 from results import results

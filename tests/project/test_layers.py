@@ -14,11 +14,12 @@ PACKAGE = ROOT / "distfsi"
 # From the top down. A folder imports only from those further down; those of one row do not know each other.
 LAYERS = (
     {"__main__"},
+    {"api"},
     {"commands"},
-    {"study"},
+    {"study", "report"},
     {"resources"},
-    {"run"},
-    {"simulation", "direct", "memory"},
+    {"execution", "sweep"},
+    {"simulation", "direct", "memory", "results"},
     {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},
@@ -143,6 +144,6 @@ def test_the_top_of_the_repository_holds_what_the_architecture_says():
 
 def test_a_run_starts_without_what_it_may_not_need():
     """Each takes a third of a second: pictures are drawn at the end, and few scenes need an equation solved."""
-    program = "import sys, distfsi.run; print(*{'matplotlib', 'scipy', 'vtk', 'cupy'} & set(sys.modules))"
+    program = "import sys, distfsi.execution; print(*{'matplotlib', 'scipy', 'vtk', 'cupy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, cwd=ROOT)
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr

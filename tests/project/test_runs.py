@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output.fields import read_cells, read_particles, series
 from distfsi.output.history import read_history
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.study.exact import PureState, exact_riemann
 from distfsi.study.references import AIR, FLYER_PLATES, WATER_AIR, WATER_AIR_ERRORS, WATER_AIR_INTERFACE

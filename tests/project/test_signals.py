@@ -17,11 +17,11 @@ import psutil
 import pytest
 
 from distfsi.errors import InputError
+from distfsi.execution import run
 from distfsi.memory import available_memory
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import picture
 from distfsi.output.restart import newest_restart
-from distfsi.run import run
 from distfsi.scene import load
 from launch import ENVIRONMENT, ROOT, run_ranks
 

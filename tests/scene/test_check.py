@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from distfsi.commands.line import main
+from distfsi.execution import run
 from distfsi.laws.fluid.ideal_gas import IdealGas
 from distfsi.laws.fluid.jwl import Jwl
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
@@ -18,7 +19,6 @@ from distfsi.resources import bench
 from distfsi.resources.estimate import Resources
 from distfsi.resources.report import report
 from distfsi.resources.works import SMALLEST, blast_on_copper, gases
-from distfsi.run import run
 from distfsi.scene import load
 from distfsi.scene.advice import advice
 from distfsi.scene.signals import Layout, moving_share, steps, sub_steps

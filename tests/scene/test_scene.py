@@ -373,7 +373,7 @@ def test_faults_between_the_parts_of_a_fluid(faults, overrides, expected):
     [
         (
             ['domain.x=["periodic", "periodic"]', "solid.bodies.tube.shape.center=[0.04, 0]"],
-            ["domain.x (--set): periodic; a scene with solids needs ends of another kind"],
+            ["domain.x (--set): periodic; a scene with bodies in a fluid needs ends of another kind"],
         ),
         (
             ["solid.bodies.tube.spacing=0.4 mm"],

@@ -32,8 +32,8 @@ def fork_run(before: int, scene: str, restart: str | None, settings: Sequence[st
     code = 1
     try:
         from distfsi.errors import DistfsiError
+        from distfsi.execution import run
         from distfsi.mesh.communicator import Communicator
-        from distfsi.run import run
         from distfsi.scene import load
 
         description = load(scene, settings)
@@ -69,16 +69,31 @@ class Counter:
                 os.kill(os.getpid(), signal.SIGKILL)
 
 
+def warm_up() -> None:
+    """Do once what each run would do for itself: import all, find fonts, make numba ready to load machine code."""
+    import matplotlib.pyplot as plt
+    import scipy.integrate  # noqa: F401
+    from numba.core.registry import cpu_target
+
+    import distfsi.execution
+    import distfsi.fluid.initial
+    import distfsi.output.picture
+    import distfsi.scene  # noqa: F401
+
+    cpu_target.target_context.refresh()
+    figure, axes = plt.subplots()
+    axes.set_title("$10^1$")
+    figure.savefig(os.devnull, format="png")
+    plt.close(figure)
+
+
 def main(scene: str, restart: str, settings: Sequence[str]) -> None:
     """Answer the numbers of the input, line by line."""
     import mpi4py
 
     mpi4py.rc.initialize = False  # each process that is forked has an MPI of its own
 
-    import distfsi.output.picture
-    import distfsi.run
-    import distfsi.scene  # noqa: F401
-
+    warm_up()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:

@@ -5,6 +5,7 @@ mpi_coupling.py    runs the cases with 1 and 2 threads and other blocks; rank 0 
 
 import hashlib
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -15,6 +16,8 @@ from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
+from distfsi.scene.bars import Bars, Bond
+from distfsi.scene.motion import Free, Motion
 from distfsi.simulation import Simulation
 
 SCHEMES = ("immersed_boundary", "cut_cells")
@@ -38,6 +41,11 @@ def body(shape, spacing, density, velocity, fixed=None, stiffness=50.0):
         Elastic(0.4 * stiffness),
         fixed,
     )
+
+
+def rigid(shape, spacing, density, velocity, name="body", **free):
+    """A free rigid body; as stiff where it meets others as an elastic one."""
+    return replace(body(shape, spacing, density, velocity), name=name, motion=Free(**free))
 
 
 def shock(mach):
@@ -101,7 +109,7 @@ class Coupled:
         t = solid.totals()
         particles = [0.0] * fluid.model.phases + [
             *t["momentum"] - solid.boundary_impulse(),
-            t["kinetic"] + t["internal"],
+            t["kinetic"] + t["internal"] - solid.gravity_work(),
         ]
         created = sum(coupling.budget_by_cause().values())
         return fluid.totals(coupling.volume)[0] + fluid.left_domain() + np.array(particles) - created
@@ -189,11 +197,27 @@ def stretched_plate(threads, block, scheme):
     return case, 25
 
 
+def among_others(threads, block, scheme):
+    """A soft ball with a bar in it between a free block, an obstacle that moves towards them and a wall, in a blast."""
+    bars = Bars(
+        0.01, 0.1, 0.05, (0,), "high", 20.0, 500.0, 5.0, 0.0, 0.1, Bond(1.0, (0.01, 0.02, 0.05), 0.4, 0.4), 0.025
+    )
+    ball = replace(body(d.Ball((0.3, 0.5), 0.1), 0.025, 3.0, (0.5, 0.0)), name="ball", bars=bars)
+    block_of = rigid(d.Box((0.45, 0.4), (0.6, 0.6)), 0.025, 2.0, (-0.5, 0.1), "block", spin=(1.0,))
+    told = Motion((0.0, 10.0), ((0.0, 0.0), (-3.0, 0.0)), (0.0, 1.0), (0.75, 0.4))
+    ram = replace(body(d.Box((0.65, 0.3), (0.85, 0.5)), 0.025, 3.0, (0, 0)), name="ram", motion=told)
+    regions = [(gas(1.0, 1.0, (0, 0)), None), (gas(2.0, 5.0, (0, 0)), d.Box((0.0, 0.0), (0.15, 1.0)))]
+    bodies, box = [ball, block_of, ram], ((0.0,) * 2, (1.0,) * 2, (20, 20))
+    given = {"scheme": scheme, "form": "total_lagrangian"}
+    return Coupled(bodies, regions, *box, None, block, threads, **given), 60
+
+
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
     cases = ((flying_discs, (4, 7)), (sinking_plate, (3, 4)), (stretched_plate, (3, 4)))
-    for scheme, (case, blocks) in product(SCHEMES, cases):
+    runs = [*product(SCHEMES, cases), ("cut_cells", (among_others, (6, 10)))]
+    for scheme, (case, blocks) in runs:
         digests = []
         for threads, block in ((1, blocks[0]), (2, blocks[1])):
             coupled, steps = case(threads, block, scheme)

@@ -46,10 +46,17 @@ def solid(
     smoothing=1.3,
     artificial_stress=0.0,
     friction=0.0,
+    walled=(),
+    wall_friction=0.0,
+    periodic=(),
 ):
-    """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end."""
+    """The solid of a scene in a box of 16 cells per axis; `symmetric` axes have a symmetry plane at their low end,
+    `walled` ones two walls."""
     D, given = len(lower), {"form": form, "artificial_stress": artificial_stress, "friction": friction}
+    given["wall_friction"] = wall_friction
     kinds = tuple(("symmetry" if axis in symmetric else "outflow", "outflow") for axis in range(D))
+    kinds = tuple(("wall", "wall") if axis in walled else ends for axis, ends in enumerate(kinds))
+    kinds = tuple(("periodic", "periodic") if axis in periodic else ends for axis, ends in enumerate(kinds))
     scene = d.Scene(
         title="test",
         domain=d.Domain(lower, upper, (16,) * D, kinds),
@@ -86,7 +93,7 @@ def digest(part):
     rows = part.communicator.concatenate(rows)
     ids = part.communicator.concatenate(c["id"])
     totals = [part.totals()[name] for name in ("mass", "kinetic", "internal", "momentum")]
-    totals += [part.boundary_impulse(), part.gravity_work()]
+    totals += [part.boundary_impulse(), part.gravity_work(), part.wall_impulse().ravel()]
     totals += [value.ravel() for value in (part.pieces() or {}).values()]
     text = rows[np.argsort(ids)].tobytes() + np.concatenate([np.atleast_1d(t) for t in totals]).tobytes()
     return len(ids), hashlib.sha256(text).hexdigest()
@@ -116,6 +123,23 @@ def bonded_discs(device):
     return solid(bodies, (-1.0, 0.0), (1.0, 1.0), (1,), device, block_cells=2, form="total_lagrangian"), 80
 
 
+def disc_that_leaves(device, communicator=None):
+    """A bonded disc that rubs at a wall and goes through an open end, while another one, without bonds, begins to."""
+    out = body(d.Ball((0.79, 0.79), 0.2), 0.05, 2000.0, (900.0, 100.0), SOFT_EOS, SOFT)
+    loose = body(d.Ball((0.7, -0.6), 0.2), 0.05, 2000.0, (800.0, 0.0), SOFT_EOS, SOFT, form="updated_lagrangian")
+    given = {"block_cells": 2, "form": "total_lagrangian", "communicator": communicator}
+    given |= {"walled": (1,), "wall_friction": 0.3}
+    return solid([out, loose], (-1.0, -1.0), (1.0, 1.0), (), device, **given), 100
+
+
+def discs_that_go_round(device, communicator=None):
+    """Discs of both forms that meet across periodic ends, and the corner of both."""
+    left = body(d.Ball((0.6, 0.66), 0.3), 0.1, 2000.0, (900.0, 500.0), SOFT_EOS, SOFT)
+    right = body(d.Ball((-0.6, -0.66), 0.3), 0.08, 8930.0, (-300.0, 0.0), form="updated_lagrangian")
+    given = {"block_cells": 2, "form": "total_lagrangian", "communicator": communicator, "periodic": (0, 1)}
+    return solid([left, right], (-1.0, -1.0), (1.0, 1.0), (), device, **given), 60
+
+
 def discs_of_two_forms(device):
     """A bonded disc between two of other forms and materials, of which one tears it apart."""
     failure = JohnsonCookFailure(0.1, 0.0, 0.0, 0.0, 0.0, 1.0, None, 0.0, None)
@@ -140,7 +164,15 @@ def bursting_ball(device, communicator=None):
 def main():
     communicator = Communicator()
     install_abort_on_exception(communicator)
-    for case in (colliding_discs, colliding_balls, bonded_discs, discs_of_two_forms, bursting_ball):
+    for case in (
+        colliding_discs,
+        colliding_balls,
+        bonded_discs,
+        discs_of_two_forms,
+        disc_that_leaves,
+        discs_that_go_round,
+        bursting_ball,
+    ):
         digests = []
         for threads in (1, 2):
             part, steps = case(Cpu(threads))
@@ -155,6 +187,8 @@ def main():
                 debris = part.communicator.concatenate(part.columns["bond_count"] == 0)
                 assert 0 < debris.sum() < len(debris)
                 assert debris.sum() < len(part.pieces()["piece"]) < len(debris)
+            assert (len(after) < len(before)) == (case is disc_that_leaves)
+            before = before[np.isin(before[:, 0], after[:, 0])]
             assert np.any(before[np.argsort(before[:, 0]), 1] != after[np.argsort(after[:, 0]), 1])
             digests.append(digest(part))
         assert digests[0] == digests[1]

@@ -80,9 +80,10 @@ class WallForces:
         device.run(self._fluid_kernels.find_transfer, band.cells.shape[0], *known)
         self._merging.ghosts.exchange((self._transfer, self._parity))
         impulse, shared = (device.empty((p.count, self._D)) for _ in ("impulse", "shared"))
-        moving = (motion.own_mass, p.fixed, p.before, p.velocity, self._spread(motion))
+        gained = self._spread(motion)
+        moving = (motion.own_mass, p.fixed, p.before, p.velocity, gained)
         device.run(self._kernels.push_together, p.count, *moving, impulse, shared)
-        return impulse, shared
+        return p.share_push(motion.own_mass, gained, impulse, shared)
 
     def correct(
         self, geometry: CutGeometry, excess: Any, shared: Any, states: States | None

@@ -24,17 +24,17 @@ def find_moved(begin, end, chunk, position, block, grid: BlockGrid, table: Block
 
 @driver
 def find_border(
-    begin, end, position, reach, image_reach, axes, planes, grid: BlockGrid, table: BlockTable, owners, rank, mark
+    begin, end, position, reach, axes, lowest, highest, grid: BlockGrid, table: BlockTable, owners, rank, mark
 ):
-    """mark[i] = 1 for particles within `reach` of another rank's blocks or `image_reach` of a plane, else 0.
+    """mark[i] = 1 for particles within `reach` of another rank's blocks, or with an image, else 0.
 
-    axes, planes (n,): the planes that mirror, across an axis where it is `planes` [m]; owners (all blocks,): of blocks.
+    axes, lowest, highest (n,): those between the two [m] along an axis have one; owners (all blocks,): of blocks.
     """
     for i in range(begin, end):
         near = 0
         # planes
         for n in range(len(axes)):
-            if abs(position[i, axes[n]] - planes[n]) <= image_reach:
+            if lowest[n] <= position[i, axes[n]] and position[i, axes[n]] <= highest[n]:
                 near = 1
         # blocks of other ranks
         low = tuple(block_coordinate(position[i, d] - reach, d, grid, table) for d in static_range(DIMENSIONS))
@@ -64,13 +64,14 @@ def mirror_values(begin, end, first, width, source, mask, parity, values):
 
 
 @driver
-def mirror_positions(begin, end, first, width, source, mask, plane, values):
-    """As mirror_values(), of positions: `plane` (images, width) holds the positions of the mirrors."""
+def position_images(begin, end, first, width, source, mask, shifted, plane, values):
+    """As mirror_values(), of positions: `plane` (images, width) holds the positions of the mirrors or, for the axes in
+    the bits of `shifted`, how far images are aside."""
     for m in range(begin, end):
         for k in range(width):
             value = values[source[m] * width + k]
-            mirrored = mask[m] >> k & 1
-            values[(first + m) * width + k] = 2.0 * plane[m, k] - value if mirrored == 1 else value
+            image = plane[m, k] + value if shifted >> k & 1 == 1 else 2.0 * plane[m, k] - value
+            values[(first + m) * width + k] = image if mask[m] >> k & 1 == 1 else value
 
 
 # What mesh/particles.py needs of these and of mesh/kernels/rows.py.
@@ -78,7 +79,7 @@ EXCHANGE = (
     find_moved,
     find_border,
     mirror_values,
-    mirror_positions,
+    position_images,
     count_marked,
     list_marked,
     take_rows,

@@ -51,6 +51,7 @@ from distfsi.solid.kernels.records import (
     DISPLACEMENT,
     EXPOSED,
     NEIGHBOURHOOD_DAMAGE,
+    RIGID,
     RUPTURE_LENGTH,
     STIFFNESS,
     STRETCH,
@@ -203,7 +204,8 @@ def pack_payload(begin, end, volume, body, cohesion: Cohesion, deformation, dama
         payload[i, NEIGHBOURHOOD_DAMAGE] = cohesion.neighbourhood_damage[i]
         payload[i, DETACHING] = 1.0 if cohesion.detaching[i] > 0 else 0.0
         payload[i, EXPOSED] = 1.0 if cohesion.exposed[i] > 0 else 0.0
-        payload[i, UNBONDED] = 1.0 if cohesion.bond_count[i] <= 0 else 0.0
+        unbonded = cohesion.bond_count[i] <= 0 and cohesion.bond_count[i] != RIGID
+        payload[i, UNBONDED] = 1.0 if unbonded else 0.0
         payload[i, RUPTURE_LENGTH] = cohesion.rupture_length[i]
         payload[i, STRETCH] = own_stretch(deformation, damage, i)
         for d in static_range(DIMENSIONS):

@@ -82,6 +82,17 @@ def move(begin, end, dt, velocity, position, moved):
 
 
 @driver
+def mark_beyond(begin, end, position, ends, mark):
+    """mark[i] = 1 for particles below `ends` (2 D,), low and high along each axis, or above them, else 0."""
+    for i in range(begin, end):
+        beyond = 0
+        for d in static_range(DIMENSIONS):
+            if position[i, d] < ends[2 * d] or position[i, d] > ends[2 * d + 1]:
+                beyond = 1
+        mark[i] = beyond
+
+
+@driver
 def pack_motion(begin, end, state, velocity, motion):
     """motion[i] = mean of old and new velocities, then the new one."""
     for i in range(begin, end):

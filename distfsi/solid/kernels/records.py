@@ -15,7 +15,8 @@ STIFFNESS, DISPLACEMENT = 0, 1
 # Columns of the payload: what ghosts get besides in the total Lagrangian form.
 VOLUME, BODY, DAMAGE, NEIGHBOURHOOD_DAMAGE, DETACHING, EXPOSED, UNBONDED, RUPTURE_LENGTH, STRETCH, CRACK = range(10)
 
-NEVER_BONDED = -1  # in the place of the number of bonds: the particle's body has the updated Lagrangian form
+# In the place of the number of bonds: the particle's body has the updated Lagrangian form, or is rigid.
+NEVER_BONDED, RIGID = -1, -2
 
 
 class Particles(NamedTuple):
