@@ -202,7 +202,7 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`.
+    """The compressible flow. One phase: Euler; several: `model`.
 
     hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
     regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
