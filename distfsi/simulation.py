@@ -32,6 +32,7 @@ from distfsi.scene.description import Solid as SolidScene
 from distfsi.scene.packing import pack
 from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
+from distfsi.solid.with_bars import SolidWithBars
 from distfsi.solid.with_rigid import SolidWithRigid
 from distfsi.step import Reason, TimeStep, find_forces, make_step, time_step
 
@@ -276,6 +277,8 @@ def structure_of(solid: SolidScene) -> type[Solid]:
     """The kind of structure that moves these bodies."""
     if solid.obstacles:
         return Obstacles
+    if any(body.bars for body in solid.bodies):
+        return SolidWithBars
     return SolidWithRigid if any(body.motion for body in solid.bodies) else Solid
 
 

@@ -118,14 +118,19 @@ def series(directory: Path, kind: str) -> list[tuple[float, Path]]:
     return [(entry["time"], path.with_name(entry["name"])) for entry in json.loads(path.read_text())["files"]]
 
 
-def read_cells(path: Path) -> tuple[float, dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Time [s], fields (nz, ny, nx) or (nz, ny, nx, 3), lower corner (3,) and cell size (3,) [m] of a cells file."""
+def read_cells(
+    path: Path, names: Sequence[str] | None = None
+) -> tuple[float, dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Time [s], fields (nz, ny, nx) or (nz, ny, nx, 3), lower corner (3,) and cell size (3,) [m] of a cells file. Of
+    the fields only `names` are read, by default all."""
     with h5py.File(path) as file:
         root = file["VTKHDF"]
         extent = root.attrs["WholeExtent"]
         shape = np.maximum(extent[1::2] - extent[::2], 1)[::-1]
         dimensions = np.count_nonzero(extent[1::2] > extent[::2])
-        fields = {name: data[()].reshape(*shape, *data.shape[dimensions:]) for name, data in root["CellData"].items()}
+        cells = root["CellData"]
+        read = {name: cells[name] for name in (cells if names is None else names)}
+        fields = {name: data[()].reshape(*shape, *data.shape[dimensions:]) for name, data in read.items()}
         return _read_time(root), fields, root.attrs["Origin"], root.attrs["Spacing"]
 
 
@@ -192,12 +197,19 @@ def field_names(path: Path) -> list[str]:
         return list(root["CellData" if "CellData" in root else "PointData"])
 
 
-def read_particles(path: Path) -> tuple[float, dict[str, np.ndarray]]:
-    """Time [s] and columns, (n,) or (n, 3), of a particles file; "position" [m] among them."""
+def read_particles(path: Path, names: Sequence[str] | None = None) -> tuple[float, dict[str, np.ndarray]]:
+    """Time [s] and columns, (n,) or (n, 3), of a particles file; "position" [m] among them. Only `names` are read, by
+    default all."""
     with h5py.File(path) as file:
         root = file["VTKHDF"]
-        columns = {name: data[()] for name, data in root["PointData"].items()}
-        return _read_time(root), {"position": root["Points"][()], **columns}
+        wanted = ["position", *root["PointData"]] if names is None else names
+        return _read_time(root), {name: root[_point_data(name)][()] for name in wanted}
+
+
+def read_time(path: Path) -> float:
+    """Time [s] of a field file."""
+    with h5py.File(path) as file:
+        return _read_time(file["VTKHDF"])
 
 
 # ---- laying down files ----------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import json
 import time as clock
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,12 @@ class Journal:
             "threads per rank": threads,
             "started": clock.strftime("%Y-%m-%d %H:%M:%S"),
             "status": "running",
+            "ambient pressure [Pa]": scene.ambient_pressure,
+            "phases": [phase.name for phase in scene.fluid.phases] if scene.fluid else [],
+            "gauges": {name: gauge.location(scene.domain.coordinates.axes) for name, gauge in scene.gauges.items()},
         }
+        if scene.origin:
+            self._notes["input"] = asdict(scene.origin)
 
     def __enter__(self) -> Journal:
         self._write()

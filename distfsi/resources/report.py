@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,6 +12,8 @@ from distfsi.output.progress import format_duration
 from distfsi.output.scales import format_bytes
 from distfsi.resources.estimate import Resources
 from distfsi.scene.advice import advice, thickness
+from distfsi.scene.bar_lines import lines_of
+from distfsi.scene.bars import Bars
 from distfsi.scene.description import Body, Scene
 from distfsi.scene.placed_charges import Charge, charges, distances, gap_between
 
@@ -34,9 +37,9 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
     for body in scene.solid.bodies if scene.solid else ():
         lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
-    for charge in charges(scene):
-        lines.append(_line("charge", _charge(charge, scene)))
-        lines += [_line("distance", text) for text in _distances(charge, scene)]
+        if body.bars:
+            lines.append(_line("bars", _bars(body, body.bars, scene)))
+    lines += [_line(name, text) for name, text in charge_lines(scene)]
     lines += [
         _line("memory", _memory(resources)),
         _line("output", _output(resources)),
@@ -45,6 +48,13 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
     ]
     lines += [_line("note", text) for text in scene.notes]
     return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+
+
+def charge_lines(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Of each charge, in words, what it is and how far bodies and gauges are from it; before each the kind of line."""
+    for charge in charges(scene):
+        yield "charge", _charge(charge, scene)
+        yield from (("distance", text) for text in _distances(charge, scene))
 
 
 def _line(name: str, text: str) -> str:
@@ -79,6 +89,13 @@ def _body(body: Body, particles: int, scene: Scene) -> str:
         return text
     text += f", {thick:.4g} m thick: {thick / body.spacing:.3g} particles"
     return text + (f", {thick / min(scene.domain.spacing):.3g} cells" if scene.fluid else "")
+
+
+def _bars(body: Body, bars: Bars, scene: Scene) -> str:
+    lines = lines_of(body, bars, scene.domain)
+    length = sum(line.share * math.dist(line.nodes[0], line.nodes[-1]) for line in lines)
+    elements = sum(len(line.nodes) - 1 for line in lines)
+    return f"{body.name}: {len(lines)} of {1e3 * bars.diameter:.4g} mm, {length:.4g} m of them in {elements:,} elements"
 
 
 def _charge(charge: Charge, scene: Scene) -> str:

@@ -140,6 +140,7 @@ def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> 
             body.packing,
             body.lattice_angle,
             body.form,
+            bars=body.bars.build(body.spacing) if body.bars else None,
         )
         for name, body in given.bodies.items()
     )

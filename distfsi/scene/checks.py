@@ -33,7 +33,7 @@ from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
 from distfsi.scene.packing import pack, uses_rings
-from distfsi.scene.rigid_checks import check_rigid, check_ties
+from distfsi.scene.rigid_checks import check_bars, check_rigid, check_ties
 from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
@@ -79,6 +79,7 @@ def check(
     yield from check_gauges(sections.gauges, present, domain, solid)
     if solid is not None:
         yield from check_rigid(sections, solid, domain, "fluid" in present)
+        yield from check_bars(solid, domain)
         ties = list(check_ties(solid))
         yield from ties or check_solid(solid, domain, sections.fluid is not None)
         if fluid is not None:

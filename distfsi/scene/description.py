@@ -17,6 +17,7 @@ from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
 from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.scene.bars import Bars
 from distfsi.scene.motion import Free, Motion
 
 Hdf5 = Literal["mpi-io", "mpio", "gather"]
@@ -234,7 +235,7 @@ class Body:
     `packing` (None: what suits the shape): rings along the surface, a lattice, turned by lattice_angle [rad] about a
     cylinder's axis or the z axis, or particles that pushed each other apart. `form` (None: that of the solid).
     A body with a `motion` is rigid: an obstacle, which stands or goes as told, or free; its law tells how
-    it meets others.
+    it meets others. `bars` that lie in it.
     """
 
     name: str
@@ -252,6 +253,7 @@ class Body:
     lattice_angle: float = 0.0
     form: SolidForm | None = None
     motion: Motion | Free | None = None
+    bars: Bars | None = None
 
     @property
     def path(self) -> tuple[str, str, str]:
@@ -390,8 +392,18 @@ class Performance:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a scene comes from: the input file, its text, and the settings that were laid over it."""
+
+    file: str
+    text: str
+    settings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it."""
+    """A checked scene. `notes`: what its input should be told in other words; `stages`: runs that come before it;
+    `origin`: None for a scene that was made in Python, and for a stage."""
 
     title: str
     domain: Domain
@@ -405,3 +417,12 @@ class Scene:
     sources: tuple[Source, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
+    origin: Origin | None = field(default=None, compare=False)
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        """[Pa] that overpressure counts from; None where it is another at each place, or without a fluid."""
+        if self.fluid is None or self.fluid.hydrostatic_level is not None:
+            return None
+        peaks = self.output.peaks
+        return peaks.ambient_pressure if peaks else self.fluid.regions[0].state.pressure

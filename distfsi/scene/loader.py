@@ -15,7 +15,7 @@ from distfsi.errors import InputError
 from distfsi.scene import build, charges, checks, materials
 from distfsi.scene.composed import meshes_in
 from distfsi.scene.coordinate_checks import check_map_is_there
-from distfsi.scene.description import Scene, Shape
+from distfsi.scene.description import Origin, Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
 from distfsi.scene.former import replace_former_words
@@ -34,7 +34,17 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     Raises InputError with one line per fault: file, key, line, what was given, what was expected.
     """
     file = File(path)
-    text, data = _read(file)
+    return _scene(file, *_read(file), overrides)
+
+
+def scene_again(origin: Origin) -> Scene:
+    """A scene from where it came from, even if the file is there no more. Raises InputError."""
+    file = File(origin.file)
+    return _scene(file, origin.text, _tables(file, origin.text), origin.settings)
+
+
+def _scene(file: File, text: str, data: dict[str, Any], overrides: Sequence[str]) -> Scene:
+    """The scene of a file with this `text`, which holds `data`."""
     overridden, faults = apply(data, overrides)
     notes = replace_former_words(data)
     uncharged, charged = charges.add_charges(data)
@@ -55,7 +65,8 @@ def load(path: str | File, overrides: Sequence[str] = ()) -> Scene:
     if faults or scene is None:
         raise InputError(locations.tell(faults))
     noted = tuple(locations.tell([*notes, *charged, *_open_surfaces(scene)]))
-    return replace(scene, notes=noted, stages=tuple(stages))
+    origin = Origin(str(file.absolute()), text, tuple(overrides))
+    return replace(scene, notes=noted, stages=tuple(stages), origin=origin)
 
 
 def _checked(data: dict[str, Any], file: File) -> tuple[Scene | None, list[Fault]]:
@@ -100,8 +111,13 @@ def _read(file: File) -> tuple[str, dict[str, Any]]:
         text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise InputError([f"{file}: is no UTF-8 text"]) from error
+    return text, _tables(file, text)
+
+
+def _tables(file: File, text: str) -> dict[str, Any]:
+    """Tables of the text of a file."""
     try:
-        return text, tomllib.loads(text)
+        return tomllib.loads(text)
     except ValueError as error:  # of tomllib, or of a number of thousands of digits
         cause = error if isinstance(error, tomllib.TOMLDecodeError) else "a number has too many digits"
         raise InputError([f"{file}: is no TOML: {cause}"]) from error

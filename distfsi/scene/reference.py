@@ -56,6 +56,8 @@ SECTIONS = {
     "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
+    "`[solid.bodies.NAME.bars]`": ("BarsInput",),
+    "`[solid.bodies.NAME.bars.bond]`": ("BondInput",),
     "`[solid.rigid.NAME]`": ("RigidInput",),
     "`[[solid.rigid.NAME.supports]]`": ("SupportInput",),
     "`[solid.obstacles.NAME]`": ("ObstacleInput",),

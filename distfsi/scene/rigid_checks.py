@@ -1,14 +1,19 @@
-"""What a schema cannot say of rigid parts and of bodies that hold together."""
+"""What a schema cannot say of rigid parts, of bars and of bodies that hold together."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from distfsi.narrowing import present
+from distfsi.scene.bar_lines import lines_of
+from distfsi.scene.bar_tables import AXES
 from distfsi.scene.description import Domain, HalfSpace, Solid
 from distfsi.scene.faults import Fault, one_of
 from distfsi.scene.motion import Motion
 from distfsi.scene.schema import Sections
+from distfsi.scene.shapes import contains
 
 
 def check_rigid(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]:
@@ -46,6 +51,26 @@ def check_rigid(sections: Sections, solid: Solid, domain: Domain, in_fluid: bool
                 yield Fault((*path, "supports", n), text)
         if any(moment <= 0.0 for moment in getattr(motion, "inertia", ())):
             yield Fault((*path, "inertia"), "must be positive")
+
+
+def check_bars(solid: Solid, domain: Domain) -> Iterator[Fault]:
+    """Bars lie along axes that there are, and in their bodies."""
+    for body in solid.bodies:
+        path = (*body.path, "bars")
+        if body.bars is None:
+            continue
+        if domain.dimensions == 1:
+            yield Fault(path, "need two or three dimensions")
+        elif missing := [AXES[axis] for axis in body.bars.directions if axis >= domain.dimensions]:
+            yield Fault((*path, "directions"), f"there is no {missing[0]} axis")
+        elif len(body.bars.directions) == 3:
+            yield Fault((*path, "directions"), "expected one axis or two: bars lie below a face of the third")
+        elif isinstance(body.shape, HalfSpace):
+            yield Fault(path, "a half space has no faces below which they lie")
+        else:
+            ends = [np.vstack([line.nodes[0], line.nodes[-1]]) for line in lines_of(body, body.bars, domain)]
+            if not ends or not contains(body.shape, np.concatenate(ends)).any():
+                yield Fault((*path, "cover"), f"no bar fits into the body with a cover of {body.bars.cover:.6g} m")
 
 
 def check_ties(solid: Solid) -> Iterator[Fault]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from distfsi.scene import description
+from distfsi.scene.bar_tables import BarsInput
 from distfsi.scene.charges import ChargeInput
 from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInput
 from distfsi.scene.law_tables import (
@@ -203,6 +204,7 @@ class BodyInput(Table):
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"
     )
     form: description.SolidForm | None = Field(None, description="as `form` of the solid, of this body alone")
+    bars: BarsInput | None = Field(None, description="bars that lie in it; default none")
 
 
 class SolidInput(Table):

@@ -44,3 +44,15 @@ def test_results_say_their_units_and_the_snippet_prints_a_number(tmp_path):
     columns = read_history(directory / "history.csv")
     assert {"fluid energy [J/m]", "solid mass [kg/m]", "left momentum_x [N s/m]"} <= set(columns)
     assert not [name for name in columns if name.endswith((" [J]", " [kg]", " [N s]"))]
+
+
+def test_the_page_on_python_runs(tmp_path):
+    """docs/python.md, its blocks one after the other."""
+    snippets = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), flags=re.DOTALL)
+    program = "\n".join(snippets).replace("inputs/", f"{ROOT}/inputs/")
+    told = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    history, fields, frame, faults = told.stdout.splitlines()
+    assert re.fullmatch(r"\S+e-07 s fluid CFL.*", history)
+    assert re.fullmatch(r"\S+e-07 \S+ Pa \(\d+, 3\)", fields)
+    assert frame == "step {'z': 1, 'y': 40, 'x': 40, 'component': 3}"
+    assert faults == "2"

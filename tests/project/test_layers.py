@@ -14,11 +14,12 @@ PACKAGE = ROOT / "distfsi"
 # From the top down. A folder imports only from those further down; those of one row do not know each other.
 LAYERS = (
     {"__main__"},
+    {"api"},
     {"commands"},
-    {"study"},
+    {"study", "report"},
     {"resources"},
-    {"execution"},
-    {"simulation", "direct", "memory"},
+    {"execution", "sweep"},
+    {"simulation", "direct", "memory", "results"},
     {"step", "diagnostics"},
     {"coupling"},
     {"fluid", "solid"},

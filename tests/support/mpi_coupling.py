@@ -16,6 +16,7 @@ from distfsi.laws.solid.eos.linear import LinearEos
 from distfsi.laws.solid.strength.elastic import Elastic
 from distfsi.mesh.communicator import Communicator, install_abort_on_exception
 from distfsi.scene import description as d
+from distfsi.scene.bars import Bars, Bond
 from distfsi.scene.motion import Free, Motion
 from distfsi.simulation import Simulation
 
@@ -197,8 +198,11 @@ def stretched_plate(threads, block, scheme):
 
 
 def among_others(threads, block, scheme):
-    """A soft ball between a free block, an obstacle that moves towards them and a wall, in a blast."""
-    ball = replace(body(d.Ball((0.3, 0.5), 0.1), 0.025, 3.0, (0.5, 0.0)), name="ball")
+    """A soft ball with a bar in it between a free block, an obstacle that moves towards them and a wall, in a blast."""
+    bars = Bars(
+        0.01, 0.1, 0.05, (0,), "high", 20.0, 500.0, 5.0, 0.0, 0.1, Bond(1.0, (0.01, 0.02, 0.05), 0.4, 0.4), 0.025
+    )
+    ball = replace(body(d.Ball((0.3, 0.5), 0.1), 0.025, 3.0, (0.5, 0.0)), name="ball", bars=bars)
     block_of = rigid(d.Box((0.45, 0.4), (0.6, 0.6)), 0.025, 2.0, (-0.5, 0.1), "block", spin=(1.0,))
     told = Motion((0.0, 10.0), ((0.0, 0.0), (-3.0, 0.0)), (0.0, 1.0), (0.75, 0.4))
     ram = replace(body(d.Box((0.65, 0.3), (0.85, 0.5)), 0.025, 3.0, (0, 0)), name="ram", motion=told)
