@@ -20,6 +20,7 @@ from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
+    "new",
     "sweep",
     "check",
     "compile",
