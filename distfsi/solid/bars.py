@@ -124,8 +124,8 @@ class BarNetwork:
         for k, law in enumerate(self._laws):
             if law.bond:
                 own = self.nodes.law_of_node == k
-                largest = self.nodes.surface[own] * bond_stress(law.bond, self.farthest[own])
-                resists[own] = np.clip(resists[own], -largest, largest)
+                bearable = self.nodes.surface[own] * bond_stress(law.bond, self.farthest[own])
+                resists[own] = np.clip(resists[own], -bearable, bearable)
         self.slipped = slip - resists / self._bond
         return resists
 
