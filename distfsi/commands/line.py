@@ -24,6 +24,7 @@ COMMANDS = (
     "sweep",
     "check",
     "compile",
+    "watch",
     "plot",
     "report",
     "info",

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wall", action=argparse.BooleanOptionalAction, help="the charge on the ground, and a wall at that distance"
     )
-    parser.add_argument("--cells", type=positive, metavar="N", help="cells from the charge to the wall (default: 100)")
+    parser.add_argument("--cells", type=positive, metavar="N", help="cells from the charge to the wall (default: 125)")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"the new file (default: {OUTPUT})")
 
 
@@ -55,7 +55,7 @@ def _ask(arguments: argparse.Namespace) -> None:
         ("tnt", "Mass of TNT", kilograms, "5 kg"),
         ("range", "Distance from the charge", metres, "3 m"),
         ("wall", "A wall there, and the charge on the ground (yes or no)", _yes, "yes"),
-        ("cells", "Cells between charge and wall", positive, "100"),
+        ("cells", "Cells between charge and wall", positive, "125"),
         ("output", "File to write", Path, str(OUTPUT)),
     ]
     for name, question, kind, usual in questions:

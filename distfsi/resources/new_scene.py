@@ -28,7 +28,7 @@ class Blast:
     tnt: float
     distance: float
     wall: bool = False
-    cells: int = 100
+    cells: int = 125
 
     @property
     def curves(self) -> AirBlast:
