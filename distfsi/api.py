@@ -73,7 +73,7 @@ def open(directory: str | Path) -> Results:  # noqa: A001
 
 
 def run_on_ranks() -> None:
-    """What each of the ranks does that `run` starts: it runs the scene of the file that it is told, as the command
+    """What each of the ranks does that `run` starts: it runs the scene of the file that it is said, as the command
     line would."""
     from distfsi.commands.ranks import reported_once, start_ranks
     from distfsi.execution import run
@@ -96,15 +96,15 @@ def _start(scene: Scene, ranks: int, words: Mapping[str, Any], progress: bool) -
     launcher = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
     if launcher is None:
         raise InputError(["there is no mpiexec to start ranks with; ranks=None runs in this process"])
-    with tempfile.NamedTemporaryFile(suffix=".scene") as file, tempfile.TemporaryFile("w+") as told:
+    with tempfile.NamedTemporaryFile(suffix=".scene") as file, tempfile.TemporaryFile("w+") as said:
         file.write(pickle.dumps((scene, words)))
         file.flush()
         command = [launcher, "-n", str(ranks), sys.executable, "-c", ON_RANKS, file.name]
         code = subprocess.run(
-            command, stdout=None if progress else subprocess.DEVNULL, stderr=told, check=False
+            command, stdout=None if progress else subprocess.DEVNULL, stderr=said, check=False
         ).returncode
-        told.seek(0)
-        message = told.read().strip()
+        said.seek(0)
+        message = said.read().strip()
     if code == InputError.exit_code:
         raise InputError(message.splitlines())
     if code:

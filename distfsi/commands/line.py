@@ -20,9 +20,11 @@ from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
+    "sweep",
     "check",
     "compile",
     "plot",
+    "report",
     "info",
     "clean",
     "examples",
@@ -42,6 +44,7 @@ examples:
   mpiexec -n 4 distfsi sod.toml        run it on four MPI ranks
   distfsi check sod.toml               what it will cost
   distfsi plot out/sod                 draw its results
+  distfsi report out/sod               a report on them, as one HTML file
 
 `distfsi COMMAND --help` explains a command.
 exit codes: 0 done, 2 wrong input, 3 the state became unphysical, 74 results could not be written, 75 stopped early

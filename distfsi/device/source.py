@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from dataclasses import fields as dataclass_fields
 from functools import cache
@@ -140,15 +140,38 @@ def parameters_of(function: Callable[..., Any], first: int = 2) -> list[str]:
     return [flat for name, record in found for flat in (flat_names(name, record) if record else [name])][first:]
 
 
-def flat_values(arguments: Iterable[object]) -> list[object]:
+FLATTENERS: dict[tuple[type, ...], Callable[..., tuple[object, ...]]] = {}  # by the types of arguments
+
+
+def flat_values(arguments: Iterable[object]) -> tuple[object, ...]:
     """What a kernel is called with: its arguments, records replaced by their fields."""
-    flat: list[object] = []
-    for argument in arguments:
-        if isinstance(argument, tuple) and hasattr(argument, "_fields"):
-            flat += flat_values(argument)
-        else:
-            flat.append(argument)
-    return flat
+    arguments = tuple(arguments)
+    kinds = tuple(map(type, arguments))
+    flatten = FLATTENERS.get(kinds)
+    if flatten is None:
+        flatten = FLATTENERS[kinds] = _flattener(arguments)
+    return flatten(*arguments)
+
+
+def _flattener(arguments: Sequence[object]) -> Callable[..., tuple[object, ...]]:
+    """flat_values() for arguments like these, as one expression: kernels are called hundreds of times in a step."""
+    names = [f"a{n}" for n in range(len(arguments))]
+    flat = [text for name, value in zip(names, arguments, strict=True) for text in _flat_texts(name, value)]
+    return eval(f"lambda {', '.join(names)}: ({''.join(f'{text}, ' for text in flat)})")
+
+
+def _flat_texts(text: str, value: object) -> list[str]:
+    """Expressions of what a value called `text` becomes. Fields of a record may be records, and those of one kind are
+    always alike."""
+    if not _is_named_tuple(value):
+        return [text]
+    if not any(map(_is_named_tuple, value)):
+        return [f"*{text}"]
+    return [flat for n, inner in enumerate(value) for flat in _flat_texts(f"{text}[{n}]", inner)]
+
+
+def _is_named_tuple(value: object) -> TypeGuard[tuple[object, ...]]:
+    return isinstance(value, tuple) and hasattr(value, "_fields")
 
 
 @cache

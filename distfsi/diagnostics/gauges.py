@@ -40,10 +40,7 @@ class SampledRun:
 
     @property
     def ambient_pressure(self) -> float | None:
-        fluid, peaks = present(self._simulation.scene.fluid), self._simulation.scene.output.peaks
-        if fluid.hydrostatic_level is not None:
-            return None
-        return peaks.ambient_pressure if peaks else fluid.regions[0].state.pressure
+        return self._simulation.scene.ambient_pressure
 
     @property
     def particles(self) -> Particles:

@@ -55,6 +55,14 @@ class Gauge(Law):
         """Keys of positions in the fluid, each with its coordinate [m] by axis."""
         return {}
 
+    def location(self, axes: str = AXES) -> str:
+        """Where it is, in words: "x = 1 m"; `axes`: their names."""
+        words = []
+        for key, position in self.positions().items():
+            values = [f"{x:g}" for x in position.values()]
+            words.append(f"{key} ({', '.join(values)}) m" if len(values) > 1 else f"{key} {_one(position, axes)} m")
+        return " ".join(words).removeprefix("position ")
+
     def walls(self) -> Mapping[str, tuple[int, int]]:
         """Keys of ends of the domain that must be walls, each with axis and side (0: low, 1: high)."""
         return {}
@@ -66,6 +74,11 @@ class Gauge(Law):
     def probe(self, run: Run) -> Probe:
         """Collective. What samples the run, which begins."""
         raise NotImplementedError
+
+
+def _one(position: Mapping[int, float], axes: str) -> str:
+    ((axis, x),) = position.items()
+    return f"{axes[axis]} = {x:g}"
 
 
 class FluidPoints(Protocol):

@@ -23,6 +23,9 @@ class BodyGauge(Gauge):
 
     needs = "solid"
 
+    def location(self, axes: str = AXES) -> str:
+        return f"body '{self.body}'"
+
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         if self.body not in bodies:
             yield "body", f"'{self.body}' is no body"

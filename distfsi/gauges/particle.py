@@ -34,6 +34,9 @@ class ParticleGauge(Gauge):
 
     needs = "solid"
 
+    def location(self, axes: str = AXES) -> str:
+        return f"particle of body '{self.body}' at ({', '.join(f'{x:g}' for x in self.position)}) m at first"
+
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         if self.body not in bodies:
             yield "body", f"'{self.body}' is no body"

@@ -27,6 +27,9 @@ class SurfaceGauge(Gauge):
 
     per_step = False
 
+    def location(self, axes: str = AXES) -> str:
+        return f"end {self.side}"
+
     def faults(self, dimensions: int, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         if self.side[0] not in AXES[:dimensions] or dimensions == 1:
             yield "side", f"'{self.side}' in a domain of {dimensions} dimension(s)"

@@ -27,6 +27,9 @@ class WallGauge(Gauge):
         """Axis and side."""
         return AXES.index(self.side[0]), int(self.side.endswith("high"))
 
+    def location(self, axes: str = AXES) -> str:
+        return f"wall {self.side}"
+
     def walls(self) -> Mapping[str, tuple[int, int]]:
         return {"side": self._end}
 

@@ -60,6 +60,8 @@ def draw_charts(path: Path, charts: Sequence[Chart], columns: int) -> Path:
         grid = figure.subplots(rows, columns, squeeze=False)
         for axes, chart in zip(grid.flat, charts, strict=False):
             _draw_chart(axes, chart)
+        for axes in grid.flat[len(charts) :]:
+            axes.remove()
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
         return _save(figure, path)

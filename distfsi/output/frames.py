@@ -11,8 +11,11 @@ from scipy.spatial import cKDTree
 
 from distfsi.narrowing import present
 from distfsi.output.fields import axis_across, field_names, read_axes, read_grid, read_layer, read_particles, series
+from distfsi.output.journal import read_journal
+from distfsi.output.scales import scaled
 
 AXES = "xyz"
+OVERPRESSURE = "overpressure"  # that of a run follows from the pressure and the ambient one
 ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of a plane, horizontal and vertical, by its normal
 
 Extent = tuple[float, float, float, float]  # left, right, bottom, top [m]; bottom = top in one dimension
@@ -24,7 +27,8 @@ class Frame:
     """A run at one `time` [s]; `cells` or `particles` are empty where it has none.
 
     cells: fields (ny, nx) or (ny, nx, 3) over `extent`, x and y being the `axes` of the plane; particles: columns of
-    those in the plane, typically `spacing` [m] apart; names: those of the axes.
+    those in the plane, typically `spacing` [m] apart; names: those of the axes; location: where a plane through three
+    dimensions lies, in words.
     """
 
     time: float
@@ -34,6 +38,7 @@ class Frame:
     spacing: float
     axes: tuple[int, int] = (0, 1)
     names: str = AXES
+    location: str = ""
 
     @property
     def dimensions(self) -> int:
@@ -72,8 +77,10 @@ class Film:
         # A run that died between the two kinds of a time has one file less of the second.
         self.times = [time for time, _ in min(present, key=len)]
         self._plane, self._mirror = plane, mirror
+        self._ambient: float | None = read_journal(directory).get("ambient pressure [Pa]")
         if not self._cells:
             self._box = self._box_of_particles()
+            self._plane = plane or fullest_plane(read_particles(self._particles[0][1])[1])
         elif plane is None and self._particles:
             self._plane = telling_plane(self._cells[0][1], self._particles[0][1])
 
@@ -82,8 +89,10 @@ class Film:
 
     @property
     def cell_fields(self) -> list[str]:
-        """Names of the fields of the cells."""
-        return field_names(self._cells[0][1]) if self._cells else []
+        """Names of the fields of the cells, and of what follows from them."""
+        names = field_names(self._cells[0][1]) if self._cells else []
+        derived = self._ambient is not None and "pressure" in names and OVERPRESSURE not in names
+        return [*names, OVERPRESSURE] if derived else names
 
     @property
     def particle_fields(self) -> list[str]:
@@ -98,20 +107,32 @@ class Film:
                 yield self._with_cells(self._cells[number][1], particles, names)
             else:
                 time, columns = read_particles(present(particles))
-                normal, at = self._plane or (2, 0.5 * (self._box[0][2] + self._box[1][2]))
+                normal, at = present(self._plane)
                 axes = ACROSS[normal]
                 left, right, low, high = (float(corner[axis]) for axis in axes for corner in self._box)
-                yield Frame(time, (left, right, low, high), {}, *_near_plane(columns, normal, at), axes)
+                deep = float(self._box[1][normal] - self._box[0][normal]) > 0.0
+                near = _near_plane(columns, normal, at)
+                yield Frame(time, (left, right, low, high), {}, *near, axes, location=_location(AXES, normal, at, deep))
 
     def _with_cells(self, cells: Path, particles: Path | None, names: Sequence[str] | None) -> Frame:
         normal, at = self._plane or (axis_across(cells), None)
-        time, fields, (low, high) = read_layer(cells, normal, at, names)
+        time, fields, (low, high) = read_layer(cells, normal, at, self._in_files(names))
+        if names and OVERPRESSURE in names and OVERPRESSURE not in fields:
+            fields[OVERPRESSURE] = fields["pressure"] - present(self._ambient)
         axes = ACROSS[normal]
         left, right, below, above = (float(corner[axis]) for axis in axes for corner in (low, high))
         at = 0.5 * (low[normal] + high[normal]) if at is None else at
         near, distance = _near_plane(read_particles(particles)[1], normal, at) if particles else ({}, 0.0)
-        frame = Frame(time, (left, right, below, above), fields, near, distance, axes, read_axes(cells))
+        names, deep = read_axes(cells), int(read_grid(cells)[0].min()) > 1
+        location = _location(names, normal, at, deep)
+        frame = Frame(time, (left, right, below, above), fields, near, distance, axes, names, location)
         return mirrored(frame) if self._mirror else frame
+
+    def _in_files(self, names: Sequence[str] | None) -> Sequence[str] | None:
+        """The fields from which those of these names come."""
+        if names is None or OVERPRESSURE not in names or OVERPRESSURE in field_names(self._cells[0][1]):
+            return names
+        return list(dict.fromkeys("pressure" if name == OVERPRESSURE else name for name in names))
 
     def _box_of_particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Low and high corner of the box around all particles at all times, with some room."""
@@ -165,6 +186,17 @@ def telling_plane(cells: Path, particles: Path) -> Plane | None:
     return normal, float(at[normal])
 
 
+def fullest_plane(columns: Mapping[str, np.ndarray]) -> Plane:
+    """The plane across z that holds most of the particles: through their middle or, as in a half of a body, along an
+    end."""
+    z = columns["position"][:, 2]
+    spacing = _near_plane(columns, 2, 0.0)[1]
+    low, high = float(z.min(initial=np.inf)), float(z.max(initial=-np.inf))
+    if not high > low:
+        return 2, low if z.size else 0.0
+    return 2, max((0.5 * (low + high), low, high), key=lambda at: int((np.abs(z - at) <= 0.5 * spacing).sum()))
+
+
 def load_frames(directory: Path, count: int) -> list[Frame]:
     """Up to `count` frames, evenly chosen from the field files in `directory`, the first and the last among them.
 
@@ -173,6 +205,12 @@ def load_frames(directory: Path, count: int) -> list[Frame]:
     film = Film(directory)
     chosen = sorted(set(np.linspace(0, len(film) - 1, count).round().astype(int).tolist()))
     return list(film.frames(chosen))
+
+
+def _location(names: str, normal: int, at: float, deep: bool) -> str:
+    """Where a plane lies, in words; it needs none unless the run is `deep`: has three dimensions."""
+    size, unit = scaled("m", abs(at))
+    return f"plane {names[normal]} = {at / size:.4g} {unit}" if deep else ""
 
 
 def _near_plane(columns: Mapping[str, np.ndarray], normal: int, at: float) -> tuple[dict[str, np.ndarray], float]:

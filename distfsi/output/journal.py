@@ -40,6 +40,9 @@ class Journal:
             "threads per rank": threads,
             "started": clock.strftime("%Y-%m-%d %H:%M:%S"),
             "status": "running",
+            "ambient pressure [Pa]": scene.ambient_pressure,
+            "phases": [phase.name for phase in scene.fluid.phases] if scene.fluid else [],
+            "gauges": {name: gauge.location(scene.domain.coordinates.axes) for name, gauge in scene.gauges.items()},
         }
         if scene.origin:
             self._notes["input"] = asdict(scene.origin)

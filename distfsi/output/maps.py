@@ -6,13 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.patheffects import Normal, Stroke
+from scipy.ndimage import distance_transform_edt
 
-from distfsi.narrowing import of_kind
+from distfsi.narrowing import of_kind, present
 from distfsi.output.frames import Frame
 from distfsi.output.panels import GAP, LEFT, TITLE, WIDTH, XLABEL, draw_bar, grid_of_panels
 from distfsi.output.progress import format_time
@@ -20,12 +23,20 @@ from distfsi.output.quantities import UNITS
 from distfsi.output.scales import label_of, largest, norm_of, scaled
 
 COLORS = {"density": "bone_r", "schlieren": "gray_r"}  # others: OTHER_COLORS
-OTHER_COLORS, PARTICLE_COLORS = "viridis", "plasma"
+OTHER_COLORS = "viridis"
+PARTICLE_COLORS = ListedColormap(
+    colormaps["OrRd"](np.linspace(0.2, 1.0, 256)), "particles"
+)  # none of the cells' colors
 SUMMARY = ("pressure", "density")  # the fields of a summary
 BAR_RIGHT, BAR_BELOW = 1.2, 0.75  # room for a color bar beside or below panels
 HIGHEST = 11.0  # all rows of panels together
 UPRIGHT_ASPECT = 0.6  # height over width of a domain from which on its maps stand side by side
 DISC = 1.25  # diameter over the distance of particles: discs of a body leave no gaps
+COVERED = "0.82"  # color of cells that hold no fluid
+BESIDE = (
+    1.6  # such cells that are no farther [cells] from fluid than this are drawn like it, where particles lie over them
+)
+MIXED, BOUNDARY = "volume_fraction", "white"  # of the first phase; color of the line where it is a half
 
 
 @dataclass(frozen=True)
@@ -60,10 +71,15 @@ def particle_colors(name: str, arrays: Sequence[np.ndarray]) -> Colors:
     return Colors(name, size, label_of(name, unit), ScalarMappable(norm, PARTICLE_COLORS))
 
 
+def field_colors(frames: Sequence[Frame], names: Sequence[str]) -> list[Colors]:
+    """Colors of those of the fields that the cells have."""
+    there = [name for name in names if name in frames[0].cells]
+    return [cell_colors(name, [values(frame.cells, name, 2) for frame in frames]) for name in there]
+
+
 def summary_colors(frames: Sequence[Frame]) -> tuple[list[Colors], Colors | None]:
     """Pressure and density of the cells; of the particles plastic strain or, where nothing has yielded, the speed."""
-    present = [name for name in SUMMARY if name in frames[0].cells]
-    fields = [cell_colors(name, [values(frame.cells, name, 2) for frame in frames]) for name in present]
+    fields = field_colors(frames, SUMMARY)
     if not any(len(frame.particles.get("position", ())) for frame in frames):
         return fields, None
     strained = largest(frame.particles.get("plastic_strain", np.zeros(0)) for frame in frames) > 0.0
@@ -164,10 +180,44 @@ def draw_maps(
 
 def _draw_field(axes: Iterable[Axes], frames: Sequence[Frame], colors: Colors, length: float) -> None:
     for panel, frame in zip(axes, frames, strict=True):
-        image = np.ma.masked_invalid(values(frame.cells, colors.name, 2) / colors.size)
+        field = values(frame.cells, colors.name, 2)
+        image = np.ma.masked_invalid((_grown(field) if len(frame.particles) else field) / colors.size)
         left, right, low, high = (edge / length for edge in frame.extent)
         norm, edges = of_kind(Normalize, colors.map.norm), (left, right, low, high)
-        panel.imshow(image, origin="lower", extent=edges, norm=norm, cmap=colors.map.cmap, aspect="auto")
+        map = present(colors.map.cmap).with_extremes(bad=COVERED)
+        panel.imshow(image, origin="lower", extent=edges, norm=norm, cmap=map, aspect="auto")
+        if is_mixed(frame):
+            _draw_boundary(panel, frame.cells[MIXED], edges)
+
+
+def is_mixed(frame: Frame) -> bool:
+    """Whether two materials meet in a plane of cells, and not only bodies between them."""
+    share = frame.cells.get(MIXED)
+    if share is None or min(share.shape) == 1:
+        return False
+    return any(
+        bool((np.diff(share > 0.5, axis=axis) & np.isfinite(np.diff(share, axis=axis))).any()) for axis in (0, 1)
+    )
+
+
+def _draw_boundary(panel: Axes, share: np.ndarray, edges: tuple[float, float, float, float]) -> None:
+    """A line where one material gives way to the other."""
+    rows, columns = share.shape
+    left, right, low, high = edges
+    x = left + (np.arange(columns) + 0.5) / columns * (right - left)
+    y = low + (np.arange(rows) + 0.5) / rows * (high - low)
+    lines = panel.contour(x, y, np.ma.masked_invalid(share), levels=[0.5], colors=BOUNDARY, linewidths=0.8)
+    lines.set_path_effects([Stroke(linewidth=1.8, foreground="black"), Normal()])
+
+
+def _grown(field: np.ndarray) -> np.ndarray:
+    """A field whose empty cells beside others take the value of the nearest one: particles lie over them, but not over
+    all of each."""
+    empty = ~np.isfinite(field)
+    if not empty.any() or empty.all():
+        return field
+    far, nearest = distance_transform_edt(empty, return_indices=True)
+    return np.where(far <= BESIDE, field[tuple(nearest)], np.nan)
 
 
 def _draw_particles(panel: Axes, frame: Frame, colors: Colors, length: float) -> None:

@@ -1,9 +1,9 @@
-"""The panels of a picture: profiles along a line, curves over time. Lengths on paper are in inches."""
+"""Sheets with a head and panels, and profiles along a line in them. Lengths on paper are in inches."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -22,28 +22,33 @@ from distfsi.output.scales import label_of, largest, norm_of, scaled
 PROFILES = ("density", "pressure", "velocity", "volume_fraction", "plastic_strain")
 LOGARITHMIC = ("density", "pressure")  # where they span decades
 TIME_COLORS = ("0.55", "tab:blue", "tab:orange", "tab:green", "tab:red")
-ROUNDING = 1e-12  # an energy that changes by less, relatively, is not drawn
 
 WIDTH = 12.0
 LEFT = 0.9  # room for the labels of an axis
 GAP, TITLE, XLABEL = 0.35, 0.4, 0.6  # between panels, above them, below the last of them
 EXPONENT = 0.2  # above a panel, for the power of ten of its axis
-PROFILE_HEIGHT, HISTORY_HEIGHT = 1.6, 3.9
+PROFILE_HEIGHT = 1.6
+HEAD = 0.4  # room for the title of a sheet
 
 
 # ---- profiles: runs along x ------------------------------------------------------------------------------------------
 
 
-def profiles_height(frames: Sequence[Frame]) -> float:
+def profiles_height(frames: Sequence[Frame], names: Sequence[str] = PROFILES) -> float:
     """Height that `draw_profiles` needs."""
-    return len(_profile_names(frames)) * (PROFILE_HEIGHT + 0.5 * GAP) + XLABEL + TITLE
+    return len(_profile_names(frames, names)) * (PROFILE_HEIGHT + 0.5 * GAP) + XLABEL + TITLE
 
 
-def draw_profiles(figure: Figure | SubFigure, frames: Sequence[Frame], fitted: Sequence[Frame] = ()) -> None:
+def draw_profiles(
+    figure: Figure | SubFigure,
+    frames: Sequence[Frame],
+    fitted: Sequence[Frame] = (),
+    names: Sequence[str] = PROFILES,
+) -> None:
     """One row per field over x, one colour per time: cells as lines, particles as dots; axes fit the frames `fitted`,
     by default those drawn."""
     fitted = fitted or frames
-    names = _profile_names(fitted)
+    names = _profile_names(fitted, names)
     left, right, _, _ = frames[0].extent
     length, metres = scaled("m", right - left)
     margins, gaps = (LEFT, 0.3, XLABEL, TITLE), (0.0, 0.5 * GAP)
@@ -74,9 +79,9 @@ def _draw_profile(axes: Axes, name: str, frames: Sequence[Frame], fitted: Sequen
     axes.grid(alpha=0.3)
 
 
-def _profile_names(frames: Sequence[Frame]) -> list[str]:
-    """The fields worth a row: not zero everywhere at all times."""
-    return [name for name in PROFILES if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
+def _profile_names(frames: Sequence[Frame], names: Sequence[str]) -> list[str]:
+    """Those of the fields that are worth a row: not zero everywhere at all times."""
+    return [name for name in names if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
 
 
 def _curves(frame: Frame, name: str) -> Iterator[tuple[np.ndarray, np.ndarray, str]]:
@@ -91,52 +96,7 @@ def _along_x(values: np.ndarray) -> np.ndarray:
     return values[:, 0] if values.ndim == 2 else values
 
 
-# ---- history ---------------------------------------------------------------------------------------------------------
-
-
-def draw_history(figure: Figure | SubFigure, history: Mapping[str, Any]) -> None:
-    """Over time: the change of each energy, the drift of each conserved total, and the time step."""
-    time = history["time [s]"]
-    size, unit = scaled("s", largest([time]))
-    free = [reason not in ("start", "end time") for reason in history["limited by"]]
-    step = np.where(free, history["time step [s]"], np.nan)
-    step_size, step_unit = scaled("s", largest([step]))
-    drifts = {name: values for name, values in history.items() if name.startswith("drift ")}
-    panels = (
-        (f"change of energy [{_unit_of_energy(history)}]", _changes(_energies(history))),
-        ("relative drift of totals", drifts),
-        (f"time step [{step_unit}]", {"": step / step_size}),
-    )
-    panels_of_sheet = grid_of_panels(figure, 1, 3, (LEFT, 0.3, XLABEL, 1.1), (1.0, 0.0))[0]
-    for axes, (title, curves) in zip(panels_of_sheet, panels, strict=True):
-        for name, values in curves.items():
-            style = "-" if np.count_nonzero(np.isfinite(values)) > 2 else ".-"
-            axes.plot(time / size, values, style, label=re.sub(r"^drift | \[.*", "", name).replace("_", " "))
-        axes.set(xlabel=f"time [{unit}]", ylabel=title)
-        axes.grid(alpha=0.3)
-        if len(curves) > 1:
-            draw_legend(axes)
-
-
-def _unit_of_energy(history: Mapping[str, np.ndarray]) -> str:
-    """Of a run in three dimensions, or per metre."""
-    return next((name.rpartition("[")[2].rstrip("]") for name in history if "energy [J" in name), "J")
-
-
-def _energies(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Energies of the parts; what the coupling creates as one."""
-    names = [name for name in history if "energy [J" in name]
-    energies = {name: history[name] for name in names if not name.startswith("coupling ")}
-    created = [history[name] for name in names if name.startswith("coupling ")]
-    return energies | ({"created by the coupling": np.sum(created, axis=0)} if created else {})
-
-
-def _changes(energies: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Energies that change, less what they are at the start."""
-    largest_of_all = max((np.abs(values).max() for values in energies.values()), default=0.0)
-    return {
-        name: values - values[:1] for name, values in energies.items() if np.ptp(values) > ROUNDING * largest_of_all
-    }
+# ---- what panels share -----------------------------------------------------------------------------------------------
 
 
 def draw_legend(axes: Axes, columns: int = 2) -> None:
@@ -145,11 +105,25 @@ def draw_legend(axes: Axes, columns: int = 2) -> None:
     axes.legend(
         fontsize="x-small",
         loc="lower left",
-        bbox_to_anchor=(-0.12, 1.0 + EXPONENT / height),
+        bbox_to_anchor=(-0.01, 1.0 + EXPONENT / height),
         ncols=columns,
         frameon=False,
         borderaxespad=0.0,
     )
+
+
+def headed(width: float, heights: Sequence[float], left: str, right: str = "") -> tuple[Figure, list[SubFigure]]:
+    """A sheet with a title on the left and a remark on the right above parts of these heights; it and the parts."""
+    figure = Figure(figsize=(width, HEAD + sum(heights)))
+    grid = figure.subfigures(1 + len(heights), 1, squeeze=False, height_ratios=[HEAD, *heights], hspace=0.0)
+    head, *parts = grid.ravel()
+    inset = 0.2 / width
+    letters = int(9.0 * width) - len(right)
+    head.text(
+        inset, 0.5, shorten(left, max(letters, 20), placeholder=" ..."), va="center", weight="bold", fontsize="large"
+    )
+    head.text(1.0 - inset, 0.5, right, va="center", ha="right", color="0.35")
+    return figure, parts
 
 
 # ---- layout of the sheet ---------------------------------------------------------------------------------------------

@@ -8,14 +8,17 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 
 PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
+UPWARDS = ("Pa", "Pa s", "J", "J/m", "J/m2", "J/kg", "N", "N/m", "N/m2", "N s", "N s/m", "N s/m2")  # take k, M, G
 DECADES = 100.0  # positive values whose largest and smallest differ by more get a logarithmic scale
 
 
 def scaled(unit: str, largest: float) -> tuple[float, str]:
-    """The decimal multiple of a unit that suits values up to `largest`: (1e6, "MPa"); only m, s and Pa take one."""
-    if unit not in ("m", "s", "Pa"):
+    """The decimal multiple of a unit that suits values up to `largest`: (1e6, "MPa"). Only m and s, and the units
+    UPWARDS, take one."""
+    if unit not in ("m", "s", *UPWARDS):
         return 1.0, unit
     size = next((size for size in PREFIXES if largest >= 0.9999 * size), 1.0)
+    size = max(size, 1.0) if unit in UPWARDS else size
     return size, PREFIXES[size] + unit
 
 

@@ -39,9 +39,7 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
         if body.bars:
             lines.append(_line("bars", _bars(body, body.bars, scene)))
-    for charge in charges(scene):
-        lines.append(_line("charge", _charge(charge, scene)))
-        lines += [_line("distance", text) for text in _distances(charge, scene)]
+    lines += [_line(name, text) for name, text in charge_lines(scene)]
     lines += [
         _line("memory", _memory(resources)),
         _line("output", _output(resources)),
@@ -50,6 +48,13 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
     ]
     lines += [_line("note", text) for text in scene.notes]
     return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+
+
+def charge_lines(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Of each charge, in words, what it is and how far bodies and gauges are from it; before each the kind of line."""
+    for charge in charges(scene):
+        yield "charge", _charge(charge, scene)
+        yield from (("distance", text) for text in _distances(charge, scene))
 
 
 def _line(name: str, text: str) -> str:

@@ -418,3 +418,11 @@ class Scene:
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
     origin: Origin | None = field(default=None, compare=False)
+
+    @property
+    def ambient_pressure(self) -> float | None:
+        """[Pa] that overpressure counts from; None where it is another at each place, or without a fluid."""
+        if self.fluid is None or self.fluid.hydrostatic_level is not None:
+            return None
+        peaks = self.output.peaks
+        return peaks.ambient_pressure if peaks else self.fluid.regions[0].state.pressure

@@ -14,23 +14,23 @@ TUBE = ["domain.cells=[64, 64]", "solid.bodies.tube.spacing=0.625 mm", "performa
 PROGRAM = """
 import sys
 import numpy as np
-from distfsi import run
+from distfsi import execution
 from distfsi.commands.line import main
 
 random = np.random.default_rng(7)  # the same on all ranks
 
-class AnyDeal(run.Balance):
+class AnyDeal(execution.Balance):
     def watch(self, limit):
         super().watch(limit)
         return random.random(self._blocks.count) ** 8
 
-run.STEPS_BETWEEN_DEALS, run.Balance = 4, AnyDeal
+execution.STEPS_BETWEEN_DEALS, execution.Balance = 4, AnyDeal
 main(sys.argv[1:])
 """
 
 
 def run_tube(directory, ranks):
-    changes = [*TUBE, "time.maximum_steps=25", f"output.directory={directory}", "output.history_every=3"]
+    changes = [*TUBE, "time.maximum_steps=13", f"output.directory={directory}", "output.history_every=3"]
     options = [word for change in changes for word in ("--set", change)]
     return run_ranks(ranks, ["-c", PROGRAM, "run", ROOT / "inputs/steel_tube.toml", "--threads", "1", *options], 300)
 
@@ -41,7 +41,7 @@ def test_no_bit_depends_on_who_owns_a_block(tmp_path):
     run_tube(tmp_path / "shared", 4)
     with (tmp_path / "shared/balance.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [(row["step"], row["blocks change hands"]) for row in rows] == [(str(n), "1") for n in range(4, 25, 4)]
+    assert [(row["step"], row["blocks change hands"]) for row in rows] == [(str(n), "1") for n in range(4, 13, 4)]
     assert results(tmp_path / "shared") == results(tmp_path / "alone")
 
 

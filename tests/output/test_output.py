@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -20,7 +21,7 @@ from distfsi.output import progress
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
 from distfsi.output.history import History, read_history
-from distfsi.output.picture import Figure, draw_summary
+from distfsi.output.picture import draw_summary
 from distfsi.output.scales import scaled
 from distfsi.output.schedule import Every
 from launch import SUPPORT
@@ -327,6 +328,7 @@ def test_durations(seconds, text):
 # ---- picture ---------------------------------------------------------------------------------------------------------
 
 COLUMNS = (
+    "step",
     "time [s]",
     "time step [s]",
     "limited by",
@@ -341,7 +343,7 @@ def finish_run(directory):
     history = History(directory / "history.csv", COLUMNS, OneRank())
     for step in range(3):
         history.append(
-            dict(zip(COLUMNS, (1e-6 * step, 1e-6 * min(step, 1), "sound", 9.0 - step, step, 0.0), strict=True))
+            dict(zip(COLUMNS, (step, 1e-6 * step, 1e-6 * min(step, 1), "sound", 9.0 - step, step, 0.0), strict=True))
         )
 
 

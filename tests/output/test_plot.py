@@ -1,5 +1,6 @@
 """Pictures and words about the results of runs, from the files that runs leave."""
 
+import io
 import json
 import subprocess
 import sys
@@ -18,10 +19,12 @@ from distfsi.execution import run
 from distfsi.mesh.communicator import Communicator
 from distfsi.output import fields, frames
 from distfsi.output.fields import read_cells, read_layer, series
-from distfsi.output.frames import Film, telling_plane
+from distfsi.output.frames import Film, fullest_plane, telling_plane
 from distfsi.output.info import describe
 from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
+from distfsi.output.tables import draw_blasts, draw_gauge
+from distfsi.output.timeline import draw_history, verdict
 from distfsi.scene import load
 from launch import ROOT
 
@@ -121,7 +124,9 @@ def test_maps_of_a_slice_with_particles(space, figures):
     assert [path.name for path in paths] == ["density-speed-y=0.35-000000.png", "history.png"]
     (image,) = figures[0].findobj(AxesImage)[:1]
     _, fields, _, _ = read_cells(series(space, "cells")[0][1])
-    assert np.array_equal(image.get_array().filled(np.nan), fields["density"][:, 3], equal_nan=True)
+    shown, there = image.get_array().filled(np.nan), np.isfinite(fields["density"][:, 3])
+    assert np.array_equal(shown[there], fields["density"][:, 3][there])
+    assert not there.all() and np.isfinite(shown).sum() > there.sum()  # no white blocks between particles and fluid
     first = figures[0].axes[0]
     assert (first.get_xlabel(), first.get_ylabel()) == ("x [m]", "z [m]")
     assert image.get_extent() == pytest.approx([0.0, 1.6, -0.5, 0.5])
@@ -144,10 +149,100 @@ def test_a_movie_holds_all_frames(space, line):
 def test_gauges(space, figures):
     paths = [path.name for path in plot(space, gauges=True)]
     assert paths == ["gauge-body.png", "gauge-line.png", "gauge-point.png", "gauge-cut.png"]
+    heads = [figure.subfigs[0].texts[0].get_text() for figure in figures]
+    assert heads[0] == "body: body 'plate'" and heads[2:] == ["point: (0.8, 0.4, 0) m", "cut: x = 0.4 m"]
     for figure in figures[:3]:
         assert_tidy(figure)
     assert len(figures[1].axes[0].lines) == 4  # times of the line
     assert {"y [m]", "z [m]"} <= {label for axes in figures[3].axes for label in (axes.get_xlabel(), axes.get_ylabel())}
+
+
+def test_a_gauge_shows_what_varies_and_tells_the_rest(figures):
+    """Overpressure and impulse come first; a pressure that is overpressure beside a constant is drawn once."""
+    time, wave = np.linspace(0.0, 1e-3, 9), 1e6 * np.sin(np.linspace(0.0, 3.0, 9))
+    table = {
+        "time [s]": time,
+        "pressure [Pa]": 101325.0 + wave,
+        "density [kg/m3]": np.full(9, 1.25),
+        "velocity_x [m/s]": wave / 400.0,
+        "velocity_y [m/s]": 0.0 * wave,
+        "volume_fraction": np.full(9, np.nan),
+        "overpressure [Pa]": wave,
+        "impulse [Pa s]": np.cumsum(wave) * 1e-4,
+    }
+    figure = draw_gauge("wall", table, "x = 1 m")
+    figure.savefig(io.BytesIO())
+    labels = [axes.get_ylabel() for axes in figure.findobj(Axes) if axes.get_visible()]
+    assert labels == ["overpressure [kPa]", "impulse [Pa s]", "velocity [m/s]"]
+    assert [text.get_text() for text in figure.subfigs[0].texts] == ["wall: x = 1 m", "0 s to 1 ms"]
+    (constants,) = figure.subfigs[1].texts
+    assert (
+        constants.get_text()
+        == "constant: ambient pressure 101.3 kPa, density 1.25 kg/m3, volume fraction without values"
+    )
+    assert_tidy(figure)
+
+
+def test_the_blast_at_points_decades_apart_is_logarithmic():
+    time = np.linspace(0.0, 1e-3, 9)
+    tables = {
+        name: {"time [s]": time, "overpressure [Pa]": peak * time, "impulse [Pa s]": peak * time**2}
+        for name, peak in (("near", 1e9), ("far", 1e5))
+    }
+    scales = [axes.get_yscale() for axes in draw_blasts(tables, "Blast").findobj(Axes)]
+    assert scales == ["log", "log"]
+    alike = {"near": tables["near"], "as_near": tables["near"]}
+    assert [axes.get_yscale() for axes in draw_blasts(alike, "Blast").findobj(Axes)] == ["linear", "linear"]
+
+
+HISTORY = {
+    "step": np.arange(4.0),
+    "time [s]": np.arange(4.0),
+    "time step [s]": np.array([0.0, 1.0, 0.9, 0.5]),
+    "limited by": ["start", "fluid CFL, 1 m/s in cell (1, 2)", "sound of solid particle 3 of body 'a'", "end time"],
+    "fluid energy [J]": np.array([5.0, 4.0, 3.0, 2.0]),
+    "left energy [J]": np.array([0.0, 1.0, 2.0, 3.0]),
+    "drift energy": np.array([0.0, 1e-15, -2e-15, 1e-15]),
+}
+
+
+def test_history_tells_what_is_fine_and_draws_what_is_not():
+    """Energies, overpressure where a gauge has it, and the step by what limits it; drifts only beyond round-off."""
+
+    def labels(history, gauges):
+        figure = Figure(figsize=(12.0, 3.9))
+        draw_history(figure, history, gauges)
+        return [axes.get_ylabel() for axes in figure.axes], figure
+
+    blast = {"time [s]": np.arange(4.0), "overpressure [Pa]": np.array([0.0, 0.0, 2e6, 1e6])}
+    shown, figure = labels(HISTORY, {"wall": blast})
+    assert shown == ["change of energy [J]", "overpressure [MPa]", "time step [s]"]
+    reasons = [text.get_text() for text in figure.axes[2].get_legend().get_texts()]
+    assert reasons == ["fluid CFL", "sound of solid"]
+    assert verdict(HISTORY) == "3 steps; mass, momentum and energy are conserved (to 2.0e-15)"
+    leaking = HISTORY | {"drift energy": np.array([0.0, 1e-5, 2e-5, 3e-5])}
+    assert labels(leaking, {})[0] == ["change of energy [J]", "time step [s]", "relative drift of totals"]
+    assert verdict(leaking) == "3 steps; totals drift (to 3.0e-05)"
+
+
+def test_peaks_are_drawn_where_cells_remember_them(tmp_path, figures):
+    changes = [f'output.directory="{tmp_path}"', "domain.cells=50", "output.fields_every=0"]
+    changes.append("output.peaks={ambient_pressure=0.1, arrival_overpressure=0.1}")
+    run(load(ROOT / "inputs" / "sod.toml", changes), Communicator(), threads=1)
+    assert "peaks.png" in [path.name for path in plot(tmp_path)]
+    labels = [axes.get_ylabel() for axes in figures[-2].findobj(Axes)]
+    assert labels == ["peak overpressure [Pa]", "positive impulse [Pa s]", "arrival time [ms]"]
+    assert figures[-2].subfigs[0].texts[0].get_text() == "Sod's shock tube"
+
+
+@pytest.mark.parametrize(("low", "at"), [(-8.5, 0.0), (0.5, 0.5)])
+def test_particles_alone_are_cut_where_most_of_them_are(low, at):
+    """A round bar, and the quarter of one above its symmetry planes."""
+    steps = np.arange(low, 9.0)
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(np.arange(9.0), steps, steps)], axis=1)
+    bar = grid[np.hypot(grid[:, 1], grid[:, 2]) < 8.6]
+    normal, found = fullest_plane({"position": bar})
+    assert normal == 2 and abs(found - at) <= 0.5
 
 
 @pytest.mark.parametrize(
@@ -213,7 +308,9 @@ def test_large_layers_are_thinned_out(space, monkeypatch):
 
 def test_particles_of_a_slice_lie_near_it(space):
     film = Film(space, (1, 0.3))
-    assert film.cell_fields == ["density", "pressure", "velocity"]
+    assert film.cell_fields == ["density", "pressure", "velocity", "overpressure"]
+    (over,) = film.frames([0], ["overpressure", "pressure"])
+    assert np.array_equal(over.cells["overpressure"], over.cells["pressure"] - 1.0, equal_nan=True)
     assert "von_mises" in film.particle_fields
     (frame,) = film.frames([0])
     assert frame.axes == (0, 2)

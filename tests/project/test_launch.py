@@ -143,6 +143,27 @@ def test_lsf(cluster):
     assert (options["Q"], options["wa"], options["wt"]) == (["75"], ["USR1"], ["5"])
 
 
+def test_a_task_of_a_job_array_runs_its_variant(cluster, tmp_path):
+    """Slurm, PBS and LSF; the results are those of the sweep's folder."""
+    table = tmp_path / "designs.csv"
+    table.write_text("title,output.fields_every\nfirst,0.1\nsecond,0.1\n")
+    out = ROOT / "out/scene-sweep"
+    script = FOLDER / "slurm" / "cpu.sbatch"
+    try:
+        cluster.run("sbatch", script, cluster.scene, "--table", table, code=0, SLURM_ARRAY_TASK_ID="2")
+        assert [path.name for path in sorted(out.iterdir())] == ["002"]
+        given = f"INPUT={cluster.scene},TABLE={table}"
+        cluster.run("qsub", "-v", given, "launch/pbs/cpu.pbs", code=0, PBS_ARRAY_INDEX="1")
+        assert [path.name for path in sorted(out.iterdir())] == ["001", "002"]
+        script = FOLDER / "lsf" / "cpu.lsf"
+        names = {"INPUT": str(cluster.scene), "TABLE": str(table), "LSB_JOBINDEX": "3"}
+        cluster.run("bsub", script=script, code=2, **names)
+        (call,) = cluster.run("qsub", "-v", f"{given},INDEX=2,LIMIT=1e-9", "launch/pbs/cpu.pbs", code=0)
+        assert call[0] == "qsub"  # it was done before, so nothing has stopped early
+    finally:
+        shutil.rmtree(out, ignore_errors=True)
+
+
 # ---- binding ---------------------------------------------------------------------------------------------------------
 
 TELL = """

@@ -47,7 +47,11 @@ class WallParticles:
         cell = max(grid.spacing[: grid.dimensions])
         self._points = WallPoints(particles, exchange.rows, kernels, cell)
         self.thin = ThinBodies(particles, wall, cell)
-        self._domain = Domain(*(self._device.array(np.array(corner)) for corner in (grid.lower, grid.upper)))
+        corners = np.array([grid.lower, grid.upper])[:, : self._D]
+        self._domain = Domain(*map(self._device.array, corners))
+        # A body that a symmetry plane cuts goes on behind it, so that the plane takes nothing of its particles.
+        symmetric = np.array(grid.boundaries[: self._D]).T == "symmetry"
+        self._whole = Domain(*map(self._device.array, np.where(symmetric, [[-np.inf], [np.inf]], corners)))
 
     def find(self, start: Any) -> Passage:
         """Collective. Find the particles, which have moved from `start` (own, D) [m]."""
@@ -68,7 +72,7 @@ class WallParticles:
         p, device, own, k, plan = self._particles, self._device, self._particles.count, self._kernels, passage.plan
         # masses and velocities of all that are seen
         own_mass = device.empty(own)
-        device.run(k.keep_mass, own, start, p.read("lone"), p.mass, p.density, self._domain, own_mass)
+        device.run(k.keep_mass, own, start, p.read("lone"), p.mass, p.density, self._whole, own_mass)
         vector = tuple((a,) for a in range(self._D))
         moving, mass = plan.exchange([(velocity, vector), (own_mass, ((),))])
         # the points of the wall, with the images that count
@@ -96,7 +100,7 @@ class WallParticles:
         """Collective. The points of a plan; values (count, 2): what of the volume `size` (own, 1) [m^D] of each is in
         the domain, and all of it."""
         inside = self._device.empty((position.shape[0], 2))
-        self._device.run(self._kernels.keep_inside, position.shape[0], position, size, self._domain, inside)
+        self._device.run(self._kernels.keep_inside, position.shape[0], position, size, self._whole, inside)
         position, volume = plan.exchange([(position, "position"), (inside, ((), ()))])
         return Cloud(position, volume, self._wall.sort(position, plan.key.device))
 
