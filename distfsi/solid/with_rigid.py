@@ -275,7 +275,8 @@ class SolidWithRigid(Solid):
         last step."""
         D, found = self.dimensions, super().reported()
         newton = per_extent("N", D)
-        forces = self.blocks.sum(self.given.reshape(len(self.given), -1)).reshape(self.given.shape[1:])
+        blocks, bodies, axes = self.given.shape
+        forces = self.blocks.sum(self.given.reshape(blocks, bodies * axes)).reshape(bodies, axes)
         forces = forces / self._elapsed if self._elapsed > 0.0 else np.zeros_like(forces)
         for b, body in self._free.items():
             name = self._scene.bodies[b].name
