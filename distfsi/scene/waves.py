@@ -34,10 +34,11 @@ class Side(NamedTuple):
 
 
 class Wave(NamedTuple):
-    """A state that forms: velocity and speed of sound [m/s]."""
+    """A state that forms: velocity and speed of sound [m/s], pressure [Pa]."""
 
     velocity: float
     sound: float
+    pressure: float
 
 
 def meet(left: Side, right: Side) -> list[Wave]:
@@ -45,7 +46,7 @@ def meet(left: Side, right: Side) -> list[Wave]:
 
     Between states of tension, and such that leave a vacuum between them, nothing is told.
     """
-    outer = Wave(left.velocity, left.sound), Wave(-right.velocity, right.sound)
+    outer = Wave(left.velocity, left.sound, left.pressure), Wave(-right.velocity, right.sound, right.pressure)
     low, high = LOWEST * min(left.pressure, right.pressure), HIGHEST * max(left.pressure, right.pressure)
     if low <= 0.0:
         return list(outer)
@@ -59,7 +60,7 @@ def meet(left: Side, right: Side) -> list[Wave]:
     inner = [_behind(side, p) for side in (left, right)]
     velocity = left.velocity - inner[0][1]
     between = [
-        Wave(velocity, _sound_speed(side.eos, rho, p)) for side, (rho, _) in zip((left, right), inner, strict=True)
+        Wave(velocity, _sound_speed(side.eos, rho, p), p) for side, (rho, _) in zip((left, right), inner, strict=True)
     ]
     return [outer[0], *between, outer[1]]
 
