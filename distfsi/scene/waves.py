@@ -52,12 +52,12 @@ def meet(left: Side, right: Side) -> list[Wave]:
         return list(outer)
 
     def approach(logarithm: float) -> float:
-        return sum(side.velocity - _behind(side, exp(logarithm))[1] for side in (left, right))
+        return sum(side.velocity - behind(side, exp(logarithm))[1] for side in (left, right))
 
     if approach(log(low)) <= 0.0 or approach(log(high)) >= 0.0:
         return list(outer)
     p = exp(brentq(approach, log(low), log(high), xtol=1e-6))
-    inner = [_behind(side, p) for side in (left, right)]
+    inner = [behind(side, p) for side in (left, right)]
     velocity = left.velocity - inner[0][1]
     between = [
         Wave(velocity, _sound_speed(side.eos, rho, p), p) for side, (rho, _) in zip((left, right), inner, strict=True)
@@ -65,7 +65,7 @@ def meet(left: Side, right: Side) -> list[Wave]:
     return [outer[0], *between, outer[1]]
 
 
-def _behind(side: Side, p: float) -> tuple[float, float]:
+def behind(side: Side, p: float) -> tuple[float, float]:
     """Density [kg/m3] behind the wave that brings a side to the pressure `p`, and by how much it slows it [m/s]."""
     return _shock(side, p) if p > side.pressure else _rarefaction(side, p)
 
