@@ -13,8 +13,6 @@ from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Grid
 from distfsi.mesh.regions import source_cell
 
-AXES = "xyz"
-
 
 class FluidSampler:
     """The fluid at fixed points, linear between the centers of cells (along r: their centroids) in each coordinate.
@@ -30,7 +28,7 @@ class FluidSampler:
         self.fluid, self.coupling = fluid, coupling
         self._primitives = fluid.model.formula("primitives")
         D, grid = fluid.model.dimensions, fluid.blocks.grid
-        self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in AXES[:D])]
+        self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in grid.coordinates.axes[:D])]
         self.columns += fields.fraction_names(fluid.model)
         scaled = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
         if grid.coordinates.radial:

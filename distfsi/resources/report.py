@@ -48,7 +48,10 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("time", _time(resources, threads, bench)),
     ]
     lines += [_line("note", text) for text in scene.notes]
-    return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+    given = list(advice(scene, resources.layout))
+    if not given:
+        lines.append(_line("verdict", "well posed: nothing is known that makes results wrong, or costs without use"))
+    return "\n".join(lines + [_line("advice", text) for text in given])
 
 
 def charge_lines(scene: Scene) -> Iterator[tuple[str, str]]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from distfsi.scene.description import Ball, Body, Box, Composed, Domain, Fluid, HalfSpace, Scene, Shape, Tube
-from distfsi.scene.shapes import smallest_extent
+from distfsi.scene.packing import pack
+from distfsi.scene.shapes import distance, smallest_extent
 from distfsi.scene.signals import COVERED, Layout, end_time, fastest_signal, states, waves
 from distfsi.scene.thermodynamics import sound_speed_squared
 from distfsi.scene.warnings import warnings
@@ -18,6 +20,7 @@ BEST_SPACING = 0.5  # of a fluid cell
 FEWEST_PARTICLES = 4  # through a body's thickness
 MAXIMUM_CELLS = 500  # across the smallest thing
 RELEASED = 5e-4  # of a liquid's rho c2: to what pressure it is let go, if that is to be right
+TOUCHING = 0.55  # spacings from particles to another body: half of one where surfaces touch
 UNREACHED = 0.25  # of the domain's length that no wave reaches
 
 
@@ -35,6 +38,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
+    yield from _untied_parts(scene)
     yield from _excess_cells(scene)
     if not mapped:
         yield from _excess_dimensions(scene)
@@ -123,6 +127,21 @@ def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
         yield f"fewer than {FEWEST_PARTICLES} particles through its thickness"
     if in_fluid and thick is not None and thick < math.sqrt(domain.dimensions) * cell:
         yield f"thinner than sqrt({domain.dimensions}) cells: the fluid sees it thicker than it is"
+
+
+def _untied_parts(scene: Scene) -> Iterator[str]:
+    """Bodies that touch and move as one but do not hold together."""
+    first = scene.solid.first_tied if scene.solid else ()
+    pairs = itertools.combinations([(b, body) for b, body in enumerate(_bodies(scene)) if not body.motion], 2)
+    for (a, one), (b, other) in pairs:
+        if one.velocity != other.velocity or first[a] == first[b]:
+            continue
+        points, _ = pack(one, scene.domain.lower, scene.domain.upper)
+        if distance(other.shape, points).min(initial=math.inf) < TOUCHING * one.spacing:
+            yield (
+                f"bodies '{one.name}' and '{other.name}' touch and do not hold together, they come apart without "
+                f'resistance; solid.tied = [["{one.name}", "{other.name}"]] joins them'
+            )
 
 
 # ---- resolution and dimensions ---------------------------------------------------------------------------------------

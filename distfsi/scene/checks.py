@@ -32,6 +32,7 @@ from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
+from distfsi.scene.load_checks import check_loads
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.rigid_checks import check_bars, check_rigid, check_ties
 from distfsi.scene.schema import (
@@ -81,6 +82,7 @@ def check(
     if solid is not None:
         yield from check_rigid(sections, solid, domain, "fluid" in present)
         yield from check_bars(solid, domain)
+        yield from check_loads(sections, domain, solid, "fluid" in present)
         ties = list(check_ties(solid))
         yield from ties or check_solid(solid, domain, sections.fluid is not None)
         if fluid is not None and len(fluid.phases) > 2:

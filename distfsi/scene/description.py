@@ -344,6 +344,16 @@ class Time:
 
 
 @dataclass(frozen=True)
+class BlastLoad:
+    """The blast of a `mass` [kg] of TNT about a `center` [m] that detonates at `start` [s]."""
+
+    mass: float
+    center: tuple[float, ...]
+    burst: str
+    start: float
+
+
+@dataclass(frozen=True)
 class Peaks:
     """What the cells remember of a blast: overpressure is above `ambient_pressure` [Pa]; a wave has arrived when it
     reaches `arrival_overpressure` [Pa]."""
@@ -417,6 +427,7 @@ class Scene:
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
+    loads: tuple[BlastLoad, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
     origin: Origin | None = field(default=None, compare=False)

@@ -20,6 +20,7 @@ from distfsi.scene.law_tables import (
     StrengthInput,
     SymmetryWord,
 )
+from distfsi.scene.load_tables import LoadInput
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.rigid_tables import ObstacleInput, RigidInput
@@ -358,6 +359,7 @@ class Sections(Table):
     charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
+    loads: dict[str, LoadInput] = Field({}, description="`[loads.NAME]`: what presses on bodies where no fluid is")
     output: OutputInput = OutputInput()
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     coupling: CouplingInput = CouplingInput()
