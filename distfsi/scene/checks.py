@@ -128,6 +128,7 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+                yield from _check_history(("fluid", "inflow", name, "history"), state)
     yield from check_reactions(given, fluid)
 
 
@@ -143,6 +144,11 @@ def check_many_phases(fluid: Fluid) -> Iterator[Fault]:
     for phase in fluid.phases:
         if not FILE_NAME.fullmatch(phase.name):
             yield Fault(("fluid", "phases", phase.name), "names a field; expected letters, digits, '_' and '-' only")
+
+
+def _check_history(path: Path, state: FluidState) -> Iterator[Fault]:
+    if state.history is not None and state.pressure + state.history.lowest <= 0.0:
+        yield Fault(path, f"falls by {-state.history.lowest:.3g} Pa, more than the pressure; expected a positive one")
 
 
 def check_rest(level: float, fluid: Fluid, domain: Domain, sources: tuple[Source, ...]) -> Iterator[Fault]:

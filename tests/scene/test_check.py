@@ -360,6 +360,7 @@ shape = { kind = "box", lower = LOWER, upper = UPPER }
         ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
         ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
         ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
+        ("water_air", ["fluid.regions.1.density=1.2"], "let go from 1e+09 to 5.41e+05 Pa"),
         (
             "shock_bubble",
             ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],
