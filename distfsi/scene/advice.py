@@ -29,6 +29,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
         yield from _absent_phases(layout.fluid, layout)
         yield from _unreached_ends(scene, layout)
     yield from warnings(scene)
+    yield from _staircases(scene)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
@@ -98,6 +99,15 @@ def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
         yield f"fewer than {FEWEST_PARTICLES} particles through its thickness"
     if in_fluid and thick is not None and thick < math.sqrt(domain.dimensions) * cell:
         yield f"thinner than sqrt({domain.dimensions}) cells: the fluid sees it thicker than it is"
+
+
+def _staircases(scene: Scene) -> Iterator[str]:
+    """Balls in lattices that others may meet."""
+    bodies = _bodies(scene)
+    for body in bodies if len(bodies) > 1 and scene.domain.dimensions == 3 else ():
+        if isinstance(body.shape, Ball) and not (body.packing or body.motion):
+            text = "its lattice makes a staircase of its surface, which turns what bounces off"
+            yield f"body '{body.name}': {text}; packing = \"relaxed\" fits it"
 
 
 # ---- resolution and dimensions ---------------------------------------------------------------------------------------
