@@ -35,6 +35,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
         yield from _unreached_ends(scene, layout)
         yield from _strong_releases(layout)
     yield from warnings(scene)
+    yield from _staircases(scene)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
@@ -142,6 +143,15 @@ def _untied_parts(scene: Scene) -> Iterator[str]:
                 f"bodies '{one.name}' and '{other.name}' touch and do not hold together, they come apart without "
                 f'resistance; solid.tied = [["{one.name}", "{other.name}"]] joins them'
             )
+
+
+def _staircases(scene: Scene) -> Iterator[str]:
+    """Balls in lattices that others may meet."""
+    bodies = _bodies(scene)
+    for body in bodies if len(bodies) > 1 and scene.domain.dimensions == 3 else ():
+        if isinstance(body.shape, Ball) and not (body.packing or body.motion):
+            text = "its lattice makes a staircase of its surface, which turns what bounces off"
+            yield f"body '{body.name}': {text}; packing = \"relaxed\" fits it"
 
 
 # ---- resolution and dimensions ---------------------------------------------------------------------------------------
