@@ -22,6 +22,7 @@ STUDIES = {  # modules of distfsi.study, with blanks for underscores
     "exact cases": "shock tubes, point blasts and others beside their exact solutions",
     "shock_bubble": "a shock that hits a cylinder of helium beside the experiment",
     "shock_bubble_speed": "time steps per second of the same case at four resolutions",
+    "air_blast": "TNT in free air, on the ground and before a wall beside the curves of Kingery and Bulmash",
     "undex_2d": "an underwater explosion in the plane beside a radial computation",
     "steel_tube": "a steel tube burst by TNT beside one-dimensional computations",
     "steel_tube fragments": "the same with failure: width, thickness and speed of the fragments",

@@ -312,7 +312,7 @@ class Fluid:
 
     def held_energies(self) -> np.ndarray:
         """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
-        first = self.model.fraction + 1
+        first = self.model.variables - len(self.model.carried)
         shares = [
             self.metrics.weighted(self.cells(b)[first:].astype(np.float64), b).sum(axis=(1, 2, 3))
             for b in range(self.blocks.local_count)

@@ -124,14 +124,18 @@ class Burn(Law):
 
 class Afterburn(Law):
     """How products of detonation burn with air. Their phase carries the share that is left, which holds back `energy`
-    [J/kg]."""
+    [J/kg].
+
+    needs_air  whether the phase beside them must be a gas
+    """
 
     folder = "laws/afterburn"
+    needs_air: ClassVar[bool] = False
     energy: float
 
-    def left(self, share, unburnt, pressure, dt):
+    def left(self, share, unburnt, pressure, air, dt):
         """A formula for kernels: the share that is left after `dt` [s] at a pressure [Pa], where a share of the
-        explosive is `unburnt`."""
+        explosive is `unburnt`, and `air` is the mass of the other phase per mass of this one."""
         raise NotImplementedError
 
 

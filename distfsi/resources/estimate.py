@@ -156,7 +156,8 @@ class Resources:
 
     def cell_file_bytes(self) -> int:
         """Bytes per cell of a field file: density, pressure, velocity and what else the scene has or asks for."""
-        scalars = 2 + (len(present(self.scene.fluid).phases) == 2)
+        phases = len(present(self.scene.fluid).phases)
+        scalars = 2 + (phases if phases > 2 else phases - 1)  # pressure, density, volume fractions
         scalars += 4 * bool(self.scene.output.peaks) + self.scene.output.schlieren
         return VECTOR + FLOAT * scalars
 
@@ -207,7 +208,8 @@ class Resources:
         fluid, D = present(self.scene.fluid), self.dimensions
         eos = {type(phase.eos) for phase in fluid.phases}
         two = "shock_bubble" if eos == {IdealGas} else "water_air" if eos <= {IdealGas, StiffenedGas} else "tnt_air"
-        rate = bench[f"{two if len(fluid.phases) == 2 else 'euler'}_2d"]["cell_stages_per_second"]
+        phases = len(fluid.phases)
+        rate = bench[f"{two if phases > 1 else 'euler'}_2d"]["cell_stages_per_second"] * min(2.0 / phases, 1.0)
         bubble = bench["shock_bubble_2d"]["cell_stages_per_second"]
         rate *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"] / bubble
         if fluid.precision == "float32":

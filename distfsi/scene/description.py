@@ -202,7 +202,7 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`.
+    """The compressible flow. One phase: Euler; several: `model`.
 
     hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
     regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
@@ -342,6 +342,16 @@ class Time:
 
 
 @dataclass(frozen=True)
+class BlastLoad:
+    """The blast of a `mass` [kg] of TNT about a `center` [m] that detonates at `start` [s]."""
+
+    mass: float
+    center: tuple[float, ...]
+    burst: str
+    start: float
+
+
+@dataclass(frozen=True)
 class Peaks:
     """What the cells remember of a blast: overpressure is above `ambient_pressure` [Pa]; a wave has arrived when it
     reaches `arrival_overpressure` [Pa]."""
@@ -415,6 +425,7 @@ class Scene:
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
+    loads: tuple[BlastLoad, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
     origin: Origin | None = field(default=None, compare=False)

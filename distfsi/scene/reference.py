@@ -68,6 +68,7 @@ SECTIONS = {
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
     "Shapes made of others, and from files": tuple(table.__name__ for table in TABLES),
     "`[sources.NAME]`": _names(Source),
+    "`[loads.NAME]`": ("LoadInput",),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
     "`[gauges.NAME]`": _names(Gauge),
