@@ -39,7 +39,7 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
-    yield from _untied_parts(scene)
+    yield from _touching_bodies(scene)
     yield from _excess_cells(scene)
     if not mapped:
         yield from _excess_dimensions(scene)
@@ -130,7 +130,7 @@ def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
         yield f"thinner than sqrt({domain.dimensions}) cells: the fluid sees it thicker than it is"
 
 
-def _untied_parts(scene: Scene) -> Iterator[str]:
+def _touching_bodies(scene: Scene) -> Iterator[str]:
     """Bodies that touch and move as one but do not hold together."""
     first = scene.solid.first_tied if scene.solid else ()
     pairs = itertools.combinations([(b, body) for b, body in enumerate(_bodies(scene)) if not body.motion], 2)
