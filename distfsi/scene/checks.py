@@ -50,6 +50,7 @@ COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would l
 FILE_NAME = re.compile(r"[\w-]+")
 LONGEST_NAME = 255  # bytes of a file's name
 LONGEST_PATH = 2000  # of the output directory's
+LARGEST_TRACES = 0.5  # of a cell that a pure region may leave to absent phases
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -84,7 +85,9 @@ def check(
         yield from check_loads(sections, domain, solid, "fluid" in present)
         ties = list(check_ties(solid))
         yield from ties or check_solid(solid, domain, sections.fluid is not None)
-        if fluid is not None:
+        if fluid is not None and len(fluid.phases) > 2:
+            yield Fault(("fluid", "phases"), "beside a solid one or two phases are known, not yet more")
+        elif fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
 
@@ -108,6 +111,8 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
     """Regions and the states in them; a method that has its phases."""
     if fluid.sharpening and len(fluid.phases) < 2:
         yield Fault(("fluid", "sharpening"), "needs an interface, so two phases")
+    if len(fluid.phases) > 2:
+        yield from check_many_phases(fluid)
     if not fluid.regions:
         yield Fault(("fluid", "regions"), "is empty; expected an initial state")
     for n, (source, region) in enumerate(zip(given.regions, fluid.regions, strict=True)):
@@ -123,7 +128,27 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+                yield from _check_history(("fluid", "inflow", name, "history"), state)
     yield from check_reactions(given, fluid)
+
+
+def check_many_phases(fluid: Fluid) -> Iterator[Fault]:
+    """What three and more phases can do, and how they are named in files."""
+    others = len(fluid.phases) - 1
+    if others * fluid.minimum_volume_fraction >= LARGEST_TRACES:
+        text = f"leaves traces of {others} absent phases too much; expected below {LARGEST_TRACES / others:.3g}"
+        yield Fault(("fluid", "minimum_volume_fraction"), text)
+    for name in ("detonation", "afterburn", "map"):
+        if getattr(fluid, name) is not None:
+            yield Fault(("fluid", name), "is known of one or two phases only, not yet of more")
+    for phase in fluid.phases:
+        if not FILE_NAME.fullmatch(phase.name):
+            yield Fault(("fluid", "phases", phase.name), "names a field; expected letters, digits, '_' and '-' only")
+
+
+def _check_history(path: Path, state: FluidState) -> Iterator[Fault]:
+    if state.history is not None and state.pressure + state.history.lowest <= 0.0:
+        yield Fault(path, f"falls by {-state.history.lowest:.3g} Pa, more than the pressure; expected a positive one")
 
 
 def check_rest(level: float, fluid: Fluid, domain: Domain, sources: tuple[Source, ...]) -> Iterator[Fault]:
@@ -149,8 +174,8 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
     """A mixture needs two phases within their bounds, a state a real sound speed."""
     if state.volume_fraction is not None:
         limit = fluid.minimum_volume_fraction
-        if len(fluid.phases) < 2:
-            yield Fault((*path, "volume_fraction"), "needs two phases")
+        if len(fluid.phases) != 2:
+            yield Fault((*path, "volume_fraction"), "needs two phases, and no more")
         elif not limit <= state.volume_fraction <= 1.0 - limit:
             yield Fault((*path, "volume_fraction"), f"expected {limit:g} to 1 - {limit:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]
@@ -216,9 +241,9 @@ def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     """What a body asks for goes together."""
     shape, turned = body.shape, body.lattice_angle != 0.0
-    round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
-    if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
-        yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
+    is_round = isinstance(shape, Ball | Tube | Cylinder) and domain.dimensions > 1
+    if body.packing == "rings" and not is_round:
+        yield Fault((*path, "packing"), "'rings' need a tube, ball or cylinder, in 2D or 3D")
     if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
         yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
     elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from distfsi.coupling.cut_cells import fluxes, forces, lone, redistribution, sides, wall_particles
+from distfsi.coupling.cut_cells.exact_surface import exact_surface
 from distfsi.coupling.cut_cells.fluxes import BandFluxes
 from distfsi.coupling.cut_cells.forces import WallForces
 from distfsi.coupling.cut_cells.geometry import WallGeometry
@@ -87,7 +88,8 @@ class CutCells:
         self._wall_sums, self._end_sums = np.zeros((2, blocks.local_count, model.conserved))
         # the kernels, and who uses them
         coarsest = max(body.spacing for body in present(scene.solid).bodies)
-        self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase)
+        surface = exact_surface(scene, solid, blocks.communicator)
+        self.wall = WallGeometry(blocks, device, coarsest, self._rest.dtype.type, self._staircase, surface)
         constants = {"DIMENSIONS": grid.dimensions, "GHOSTS": grid.ghost_layers}
         constants |= {"LANES": self.wall.lanes, "TRANSFERRED": 1 + grid.dimensions}
         of_particles = device.build(PARTICLE_DRIVERS, constants)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from distfsi.coupling.cut_cells.exact_surface import ExactSurface
 from distfsi.coupling.cut_cells.kernels import fractions, inflation, nodal_distance
 from distfsi.coupling.cut_cells.kernels.images import ImageRange
 from distfsi.coupling.cut_cells.kernels.inflation import Inflation
@@ -43,6 +44,7 @@ DRIVERS = (
     count_marked,
     list_marked,
 )
+EXACT = (nodal_distance.node_positions, nodal_distance.put_distances)
 STAIRCASE = (fractions.round_fractions, fractions.round_apertures)
 
 
@@ -125,12 +127,17 @@ class WallGeometry:
     reach      [m]: how far from this rank's blocks particles change them
     """
 
-    def __init__(self, blocks: Blocks, device: Device, spacing: float, real: type, staircase: bool):
-        """`spacing` [m] of the coarsest particles; `staircase`: cells are open as a whole or not at all."""
+    def __init__(
+        self, blocks: Blocks, device: Device, spacing: float, real: type, staircase: bool, surface: ExactSurface | None
+    ):
+        """`spacing` [m] of the coarsest particles; `staircase`: cells are open as a whole or not at all; `surface`: of
+        the bodies in the place of what the particles tell."""
+        self._surface = surface
+        self._nodes, self._distances = np.empty(0, dtype=np.int64), device.empty(0)  # that were found from the surface
         self.blocks, self.device, self.grid, D = blocks, device, blocks.grid_on(device), blocks.grid.dimensions
         self.lanes, self._staircase = min(device.lanes, NEAR_LANES), staircase
         constants = {"DIMENSIONS": D, "LANES": self.lanes, "GHOSTS": blocks.grid.ghost_layers}
-        self.kernels: SimpleNamespace = device.build((*DRIVERS, *(STAIRCASE if staircase else ())), constants)
+        self.kernels: SimpleNamespace = device.build((*DRIVERS, *EXACT, *(STAIRCASE if staircase else ())), constants)
         self._rows = Rows(device, self.kernels)
         self._cells = search.CellSort(self.kernels, device, blocks.grid.lower[:D], blocks.grid.upper[:D])
         self._lengths = lengths = lengths_of(blocks.grid.spacing[:D], spacing, blocks.grid.ghost_layers, staircase)
@@ -197,11 +204,33 @@ class WallGeometry:
         run(k.mark_inflated, count, sphere, points.values, mark)
         inflated, rows = self._rows.marked(mark)
         nodes = self._nodes_near(self._lengths.search if inflated else self.radius, points.bins)
-        boxes = -(-nodes.shape[0] // self.lanes)
-        run(k.find_distances, boxes, nodes, distance, self.radius, self._profile, points, self.grid)
+        if self._surface:
+            self._take_distances(self._surface, nodes)
+        else:
+            boxes = -(-nodes.shape[0] // self.lanes)
+            run(k.find_distances, boxes, nodes, distance, self.radius, self._profile, points, self.grid)
         if inflated:
             self.add_spheres(nodes, *(self._rows.taken(array, rows) for array in (points.position, sphere, key)))
         self._open()
+
+    def _take_distances(self, surface: ExactSurface, nodes: Any) -> None:
+        """Distances at the `nodes` become those of the `surface`, which are found once."""
+        run, k, number, known = self.device.run, self.kernels, nodes.shape[0], self.device.download(nodes)
+        if not np.array_equal(known, self._nodes):
+            position = self.device.empty((number, self.blocks.grid.dimensions))
+            run(k.node_positions, number, nodes, position, self.grid)
+            self._nodes, found = known, surface.distance(self.device.download(position))
+            self._distances = self.device.array(found)
+        run(k.put_distances, number, nodes, self._distances, self._distance.device.reshape(-1), self.radius, self.grid)
+
+    def spare_thick(self, position: Any, sphere: Any) -> Any:
+        """The spheres (own, 2 + D) of the first points at a `position` (n, D), less those in bodies of a known surface
+        that are not thin."""
+        if self._surface is None:
+            return sphere
+        own = self.device.download(position)[: sphere.shape[0]]
+        thick = self._surface.is_thick(own, 2.0 * self._lengths.inflation.largest)
+        return self.device.array(np.where(thick[:, None], 0.0, self.device.download(sphere)))
 
     def _nodes_near(self, reach: float, bins: Bins) -> Any:
         """The nodes (n,) that may have particles within `reach` [m]; the others are open."""

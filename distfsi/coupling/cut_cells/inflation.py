@@ -36,6 +36,7 @@ class ThinBodies:
             chosen = self._wall.coarse_order(points.position, plan.key.device)
             (filled,) = plan.exchange([(self._wall.fill(plan.own, chosen, points), ((), *vector))])
             own = self._wall.inflate(plan.own, filled, chosen, points)
+            own = self._wall.spare_thick(points.position, own)
             self.drift = np.inf if split else 0.0
             if not split:
                 self._particles.adopt("inflation", own)

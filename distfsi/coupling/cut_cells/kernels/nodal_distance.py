@@ -198,6 +198,22 @@ def find_distances(begin, end, chosen, distance, radius, profile, particles: Clo
 
 
 @driver
+def node_positions(begin, end, chosen, position, grid: BlockGrid):
+    """position (n, D) [m] of the nodes `chosen`, in the mirror of the domain's sides."""
+    for n in range(begin, end):
+        x = position_of_node(chosen[n], grid)
+        for d in static_range(DIMENSIONS):
+            position[n, d] = x[d]
+
+
+@driver
+def put_distances(begin, end, chosen, found, distance, radius, grid: BlockGrid):
+    """distance [m] at the nodes `chosen` = what is `found` (n,) of them, at most `radius`."""
+    for n in range(begin, end):
+        distance[chosen[n]] = off_node(min(max(found[n], -radius), radius), chosen[n], grid)
+
+
+@driver
 def add_spheres(begin, end, chosen, distance, largest, reach, particles: Cloud, grid: BlockGrid):
     """distance becomes that to the spheres of inflated particles, their values, where they are nearer, at the nodes
     `chosen`; none is larger than the `largest` [m]. An item is a box of LANES nodes."""
