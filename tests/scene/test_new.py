@@ -65,6 +65,7 @@ def test_the_command_writes_a_new_file_and_no_other(tmp_path, capsys):
     for wrong, fault in (
         (words, "wall.toml: is there already"),
         (["new", "--tnt", "5 kg"], "--range: is missing"),
+        (["new", "--tnt", "5 kg", "--range", "3 m", "--cells", "9"], "--cells: is of a scene with --wall"),
         (["new", "--tnt", "5 kg", "--range", "1 km", "-o", f"{tmp_path}/x"], "--range 1000 m: scaled distance 584.8"),
         (["new", "--tnt", "5 kg", "--range", "10 cm", "-o", f"{tmp_path}/x"], "--range 0.1 m: "),
     ):
@@ -75,13 +76,14 @@ def test_the_command_writes_a_new_file_and_no_other(tmp_path, capsys):
 
 def test_on_a_terminal_it_asks(tmp_path, monkeypatch, capsys):
     """Wrong answers are asked again, no answer means what stands in brackets, and flags are not asked for."""
-    answers = iter(["five", "5 kg", "", "perhaps", "no", "", str(tmp_path / "asked.toml")])
+    answers = iter(["five", "5 kg", "", "perhaps", "yes", "20", str(tmp_path / "asked.toml")])
     questions = []
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     monkeypatch.setattr("builtins.input", lambda question: (questions.append(question), next(answers))[1])
     main(["new"])
-    assert load(tmp_path / "asked.toml").title == "5 kg of TNT, 3 m away"
+    scene = load(tmp_path / "asked.toml")
+    assert (scene.title, scene.domain.cells[0]) == ("5 kg of TNT on the ground, 3 m before a wall", 20)
     assert [question.split(" [")[0] for question in questions] == [
         *["Mass of TNT"] * 2,
         "Distance from the charge",
