@@ -9,7 +9,7 @@ from copy import deepcopy
 from typing import Any
 
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, PressureHistory, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.loader import schema
@@ -54,7 +54,8 @@ SECTIONS = {
     "`[fluid.afterburn]`": ("AfterburnSectionInput",),
     "`law` of the afterburn": _names(Afterburn),
     "`[fluid.map]`": ("MapInput",),
-    "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
+    "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("InflowStateInput",),
+    "`history` of an inflow": _names(PressureHistory),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
     "`[solid.bodies.NAME.bars]`": ("BarsInput",),

@@ -43,6 +43,7 @@ ADVICE = {  # on purpose
     "cavitation": ("phase 'air' fills no cell",),  # only traces of it, from which the bubbles grow
     "thin_plate": ("thinner than sqrt(2) cells",),
     "concrete_slab": ("2.7 cells per radius",),
+    "undex_plate": ("fewer than 4 particles", "thinner than sqrt(3) cells"),
     "steel_tube_full": ("the rest is hidden", "into body 'tube'"),  # the charge leans against the tube
 }
 
@@ -360,6 +361,7 @@ shape = { kind = "box", lower = LOWER, upper = UPPER }
         ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
         ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
         ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
+        ("water_air", ["fluid.regions.1.density=1.2"], "let go from 1e+09 to 5.41e+05 Pa"),
         (
             "shock_bubble",
             ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],
