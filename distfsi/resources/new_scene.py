@@ -169,7 +169,7 @@ shape = {{ kind = "ball", center = 0, radius = "{1e3 * self.radius:.6g} mm" }} #
 kind = "point"
 position = [{R - middle:.6g}, {middle:.6g}, {middle:.6g}]
 
-[gauges.wall] # maps of peak overpressure and impulse, force and its impulse
+[gauges.wall] # maps of peak overpressure and impulse, force and its impulse; beside the open ends they are too high
 kind = "surface"
 side = "x_high"
 
