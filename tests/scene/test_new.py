@@ -9,9 +9,12 @@ from distfsi.air_blast import FREE_AIR, SURFACE, air_blast
 from distfsi.commands import new
 from distfsi.commands.line import main
 from distfsi.errors import InputError
-from distfsi.report.results import burst_of
+from distfsi.execution import run
+from distfsi.mesh.communicator import Communicator
+from distfsi.report.results import blasts, burst_of
 from distfsi.resources.new_scene import Blast
 from distfsi.resources.report import report
+from distfsi.results import Results
 from distfsi.scene import load
 from distfsi.scene.placed_charges import charges
 from distfsi.scene.warnings import warnings
@@ -92,3 +95,16 @@ def test_on_a_terminal_it_asks(tmp_path, monkeypatch, capsys):
         "File to write",
     ]
     assert next(answers, None) is None and new.OUTPUT.name == "blast.toml"
+
+
+@pytest.mark.full
+def test_the_foot_of_the_wall_gets_the_impulse_of_the_curves(written, tmp_path, monkeypatch):
+    """Coarse cells have the impulse of UFC 3-340-02 within 15 %, and of the peak what finer ones approach."""
+    monkeypatch.chdir(tmp_path)
+    run(written(Blast(5.0, 3.0, wall=True, cells=30)), Communicator())
+    (found,) = blasts(Results("out/blast"))
+    peak, arrival, impulse = found.expected
+    assert found.kind == "reflected, hemisphere on the ground"
+    assert found.impulse == pytest.approx(impulse, rel=0.15)
+    assert found.arrival == pytest.approx(arrival, rel=0.15)
+    assert 0.4 * peak < found.peak < peak
