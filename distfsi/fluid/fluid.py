@@ -272,7 +272,8 @@ class Fluid:
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells that a stage computes."""
-        return np.bincount(self.tiling.block, self.tiling.cells * ~self.rest.settled, self.blocks.local_count)
+        cells = self.tiling.cells * ~self.rest.settled
+        return np.bincount(self.tiling.block, cells, self.blocks.local_count).astype(float)  # of no tiles: integers
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""

@@ -35,10 +35,11 @@ def advice(scene: Scene, layout: Layout | None) -> Iterator[str]:
         yield from _unreached_ends(scene, layout)
         yield from _strong_releases(layout)
     yield from warnings(scene)
+    yield from _staircases(scene)
     for body in _bodies(scene):
         for text in _body(body, scene.domain, scene.fluid is not None):
             yield f"body '{body.name}': {text}"
-    yield from _untied_parts(scene)
+    yield from _touching_bodies(scene)
     yield from _excess_cells(scene)
     if not mapped:
         yield from _excess_dimensions(scene)
@@ -129,7 +130,7 @@ def _body(body: Body, domain: Domain, in_fluid: bool) -> Iterator[str]:
         yield f"thinner than sqrt({domain.dimensions}) cells: the fluid sees it thicker than it is"
 
 
-def _untied_parts(scene: Scene) -> Iterator[str]:
+def _touching_bodies(scene: Scene) -> Iterator[str]:
     """Bodies that touch and move as one but do not hold together."""
     first = scene.solid.first_tied if scene.solid else ()
     pairs = itertools.combinations([(b, body) for b, body in enumerate(_bodies(scene)) if not body.motion], 2)
@@ -142,6 +143,15 @@ def _untied_parts(scene: Scene) -> Iterator[str]:
                 f"bodies '{one.name}' and '{other.name}' touch and do not hold together, they come apart without "
                 f'resistance; solid.tied = [["{one.name}", "{other.name}"]] joins them'
             )
+
+
+def _staircases(scene: Scene) -> Iterator[str]:
+    """Balls in lattices that others may meet."""
+    bodies = _bodies(scene)
+    for body in bodies if len(bodies) > 1 and scene.domain.dimensions == 3 else ():
+        if isinstance(body.shape, Ball) and not (body.packing or body.motion):
+            text = "its lattice makes a staircase of its surface, which turns what bounces off"
+            yield f"body '{body.name}': {text}; packing = \"relaxed\" fits it"
 
 
 # ---- resolution and dimensions ---------------------------------------------------------------------------------------

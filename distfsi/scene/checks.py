@@ -241,9 +241,9 @@ def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     """What a body asks for goes together."""
     shape, turned = body.shape, body.lattice_angle != 0.0
-    round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
-    if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
-        yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
+    is_round = isinstance(shape, Ball | Tube | Cylinder) and domain.dimensions > 1
+    if body.packing == "rings" and not is_round:
+        yield Fault((*path, "packing"), "'rings' need a tube, ball or cylinder, in 2D or 3D")
     if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
         yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
     elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):

@@ -43,6 +43,7 @@ ADVICE = {  # on purpose
     "cavitation": ("phase 'air' fills no cell",),  # only traces of it, from which the bubbles grow
     "thin_plate": ("thinner than sqrt(2) cells",),
     "concrete_slab": ("2.7 cells per radius",),
+    "undex_plate": ("fewer than 4 particles", "thinner than sqrt(3) cells"),
     "steel_tube_full": ("the rest is hidden", "into body 'tube'"),  # the charge leans against the tube
 }
 
