@@ -24,6 +24,7 @@ STUDIES = {  # modules of distfsi.study, with blanks for underscores
     "shock_bubble_speed": "time steps per second of the same case at four resolutions",
     "air_blast": "TNT in free air, on the ground and before a wall beside the curves of Kingery and Bulmash",
     "undex_2d": "an underwater explosion in the plane beside a radial computation",
+    "undex_sphere": "a charge in water beside radial computations and Cole's similitude, and its bubble",
     "steel_tube": "a steel tube burst by TNT beside one-dimensional computations",
     "steel_tube fragments": "the same with failure: width, thickness and speed of the fragments",
     "tube_alone": "the steel tube under a given pressure: when it fails and into what",

@@ -27,7 +27,7 @@ from distfsi.simulation import deal_blocks
 PROCESS_BYTES = 140e6  # of a rank that has no blocks: Python and its libraries
 KERNEL_BYTES = 102e6  # of numba and compiled kernels: of a fluid where there are blocks, of solids on all ranks
 DRAWING_BYTES, PICTURE_BYTES = 45e6, 25e6  # on the first rank: of matplotlib, of the maps of a fluid in the summary
-COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
+COUPLING_BYTES = 20e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
     "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 4300.0},
     "updated_lagrangian": {1: 900.0, 2: 1250.0, 3: 2800.0},

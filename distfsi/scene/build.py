@@ -14,6 +14,7 @@ from distfsi.laws.sources.gravity import Gravity
 from distfsi.narrowing import present
 from distfsi.scene.description import (
     Afterburn,
+    Ball,
     Body,
     Coupling,
     Detonation,
@@ -22,11 +23,13 @@ from distfsi.scene.description import (
     FluidState,
     Map,
     Output,
+    Packing,
     Peaks,
     Performance,
     Phase,
     Region,
     Solid,
+    SolidForm,
     Time,
 )
 from distfsi.scene.detonation_tables import DetonationInput
@@ -34,9 +37,11 @@ from distfsi.scene.law_tables import SourceInput
 from distfsi.scene.motion import Free, Motion, Support
 from distfsi.scene.rigid_tables import ObstacleInput, RigidInput, SupportInput
 from distfsi.scene.schema import (
+    BodyInput,
     CouplingInput,
     DomainInput,
     FluidInput,
+    InflowStateInput,
     MapInput,
     OutputInput,
     PerformanceInput,
@@ -119,7 +124,9 @@ def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> Flu
     p = given.pressure
     if p is None:
         p = pressure(phases[index].eos, given.density, present(given.energy))
-    return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
+    state = FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
+    history = given.history if isinstance(given, InflowStateInput) else None
+    return state if history is None else replace(state, history=history.build())
 
 
 def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> Solid:
@@ -137,7 +144,7 @@ def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> 
             body.failure.build() if body.failure else None,
             body.fixed_velocity,
             body.radial_velocity,
-            body.packing,
+            body.packing or _fitted_packing(body, body.form or given.form, dimensions),
             body.lattice_angle,
             body.form,
             bars=body.bars.build(body.spacing) if body.bars else None,
@@ -152,6 +159,13 @@ def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> 
     form = (given.objective_rate, given.form)
     rest = (given.zero_energy, given.artificial_stress, given.friction)
     return Solid(bodies + rigid + obstacles, given.smoothing, *viscosity, *form, *rest, given.tied, given.wall_friction)
+
+
+def _fitted_packing(given: BodyInput, form: SolidForm, dimensions: int) -> Packing | None:
+    """What a body gets that asks for none; None: what suits its shape. A disc that bonds hold gets rings: as a lattice
+    it would be a staircase, which turns what bounces off it."""
+    is_disc = dimensions == 2 and isinstance(given.shape.build(), Ball) and not given.lattice_angle
+    return "rings" if is_disc and form == "total_lagrangian" else None
 
 
 def _modulus(body: Body) -> float:

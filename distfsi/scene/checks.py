@@ -128,6 +128,7 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+                yield from _check_history(("fluid", "inflow", name, "history"), state)
     yield from check_reactions(given, fluid)
 
 
@@ -143,6 +144,11 @@ def check_many_phases(fluid: Fluid) -> Iterator[Fault]:
     for phase in fluid.phases:
         if not FILE_NAME.fullmatch(phase.name):
             yield Fault(("fluid", "phases", phase.name), "names a field; expected letters, digits, '_' and '-' only")
+
+
+def _check_history(path: Path, state: FluidState) -> Iterator[Fault]:
+    if state.history is not None and state.pressure + state.history.lowest <= 0.0:
+        yield Fault(path, f"falls by {-state.history.lowest:.3g} Pa, more than the pressure; expected a positive one")
 
 
 def check_rest(level: float, fluid: Fluid, domain: Domain, sources: tuple[Source, ...]) -> Iterator[Fault]:
@@ -235,9 +241,9 @@ def check_solid(solid: Solid, domain: Domain, in_fluid: bool) -> Iterator[Fault]
 def _check_body(path: Path, body: Body, domain: Domain) -> Iterator[Fault]:
     """What a body asks for goes together."""
     shape, turned = body.shape, body.lattice_angle != 0.0
-    round_in_2d = isinstance(shape, Ball | Tube) and domain.dimensions == 2
-    if body.packing == "rings" and not (round_in_2d or isinstance(shape, Cylinder)):
-        yield Fault((*path, "packing"), "'rings' need a tube or ball in 2D, or a cylinder")
+    is_round = isinstance(shape, Ball | Tube | Cylinder) and domain.dimensions > 1
+    if body.packing == "rings" and not is_round:
+        yield Fault((*path, "packing"), "'rings' need a tube, ball or cylinder, in 2D or 3D")
     if turned and (isinstance(shape, Composed) or body.packing == "relaxed"):
         yield Fault((*path, "lattice_angle"), "needs a simple shape with a lattice; kind = 'rotate' turns any other")
     elif turned and (uses_rings(body) or isinstance(shape, HalfSpace) or domain.dimensions == 1):

@@ -16,7 +16,7 @@ from distfsi.coordinates import Coordinates
 from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
-from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Burn, Failure, FluidEos, PressureHistory, SolidEos, Source, Strength
 from distfsi.scene.bars import Bars
 from distfsi.scene.motion import Free, Motion
 
@@ -125,6 +125,7 @@ class FluidState:
     """State of a phase: density [kg/m3], pressure [Pa], velocity [m/s]; `phase` indexes Fluid.phases.
 
     volume_fraction: of the phase in a mixture with the other one; None: pure, but for the least trace of the other
+    history: of an inflow, the overpressure [Pa] that comes in; None: always the same
     """
 
     phase: int
@@ -132,6 +133,7 @@ class FluidState:
     pressure: float
     velocity: tuple[float, ...]
     volume_fraction: float | None = None
+    history: PressureHistory | None = None
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ def pack(body: Body, lower: tuple[float, ...], upper: tuple[float, ...]) -> tupl
     """Particles of `body` inside the domain [lower, upper]: positions (n, D) [m], volumes (n,) [m^D].
 
     A Box is cut to the domain and filled exactly; a Ball gets a lattice about its center, a HalfSpace one that fills
-    the domain, a Tube (2D) and a Cylinder rings, unless the body asks for the other. Lattice and rings leave planes
-    through the center between particles. What is composed: scene/fitting.py.
+    the domain, a Tube (2D) and a Cylinder rings, unless the body asks for the other; in 3D rings of a Ball or Tube lie
+    in shells. Lattice and rings leave planes through the center between particles. What is composed: scene/fitting.py.
     """
     shape = body.shape
     if isinstance(shape, Composed) and not isinstance(shape, Cloud) and is_its_bounding_box(shape):
@@ -158,13 +158,13 @@ def _clipped_volume(shape: HalfSpace, lower: np.ndarray, upper: np.ndarray) -> f
 
 
 def _in_rings(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Particles in rings that follow the surface: of a tube or ball (2D), in layers of a cylinder."""
+    """Particles in rings that follow the surface: of a tube or ball, in layers of a cylinder."""
     match body.shape:
         case Tube(center, inner, outer):
-            positions, volumes = _rings(inner, outer, body.spacing)
+            positions, volumes = _round_layers(len(center), inner, outer, body.spacing)
             return positions + np.asarray(center), volumes
         case Ball(center, radius):
-            positions, volumes = _rings(0.0, radius, body.spacing)
+            positions, volumes = _round_layers(len(center), 0.0, radius, body.spacing)
             return positions + np.asarray(center), volumes
         case Cylinder(_, _, outer, inner):
             section, areas = _rings(inner, outer, body.spacing)
@@ -174,8 +174,33 @@ def _in_rings(body: Body) -> tuple[np.ndarray, np.ndarray]:
             raise TypeError(f"no rings fill a {type(shape).__name__}")
 
 
+def _round_layers(dimensions: int, inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Layers about the origin between two radii [m]: rings in 2D, shells in 3D."""
+    return (_rings if dimensions == 2 else _shells)(inner, outer, spacing)
+
+
+def _shells(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shells of equal thickness about the origin, of rings about z, each with a multiple of four particles: positions
+    (n, 3) [m] and volumes (n,) [m3]. The three planes through the origin lie between particles."""
+    edges = np.linspace(inner, outer, max(1, round((outer - inner) / spacing)) + 1)
+    positions, volumes = [], []
+    for low, high in itertools.pairwise(edges):
+        radius = 0.5 * (low + high)
+        slices = np.linspace(0.0, math.pi, 2 * max(1, round(0.5 * math.pi * radius / spacing)) + 1)
+        for first, last in itertools.pairwise(slices):
+            middle = 0.5 * (first + last)
+            count = 4 * max(1, round(0.5 * math.pi * radius * math.sin(middle) / spacing))
+            angle = (np.arange(count) + 0.5) * (2.0 * math.pi / count)
+            across = np.stack([np.cos(angle), np.sin(angle)], axis=1) * math.sin(middle)
+            positions.append(radius * np.column_stack([across, np.full(count, math.cos(middle))]))
+            part = 2.0 * math.pi / 3.0 * (high**3 - low**3) * (math.cos(first) - math.cos(last))
+            volumes.append(np.full(count, part / count))
+    return np.concatenate(positions), np.concatenate(volumes)
+
+
 def _rings(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rings of equal thickness about the origin, each with a multiple of four particles about `spacing` apart."""
+    """Rings of equal thickness about the origin, each with a multiple of four particles about `spacing` apart:
+    positions (n, 2) [m] and areas (n,) [m2]."""
     edges = np.linspace(inner, outer, max(1, round((outer - inner) / spacing)) + 1)
     positions, volumes = [], []
     for low, high in itertools.pairwise(edges):

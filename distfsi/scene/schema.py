@@ -14,6 +14,7 @@ from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInp
 from distfsi.scene.law_tables import (
     FailureInput,
     GaugeInput,
+    HistoryInput,
     SolidEosInput,
     SourceInput,
     StrengthInput,
@@ -112,15 +113,25 @@ class RegionInput(StateInput):
     shape: Shape | None = Field(None, description="where; the first region has none and covers everything")
 
 
+class InflowStateInput(StateInput):
+    """State that comes in through an end."""
+
+    history: HistoryInput | None = Field(
+        None,
+        description="overpressure in time; density and velocity are those behind a wave of it that runs into fluid of "
+        "this state; default none",
+    )
+
+
 class InflowInput(Table):
     """State that comes in through each end whose kind is `inflow`."""
 
-    x_low: StateInput | None = None
-    x_high: StateInput | None = None
-    y_low: StateInput | None = None
-    y_high: StateInput | None = None
-    z_low: StateInput | None = None
-    z_high: StateInput | None = None
+    x_low: InflowStateInput | None = None
+    x_high: InflowStateInput | None = None
+    y_low: InflowStateInput | None = None
+    y_high: InflowStateInput | None = None
+    z_low: InflowStateInput | None = None
+    z_high: InflowStateInput | None = None
 
 
 class MapInput(Table):
@@ -199,8 +210,9 @@ class BodyInput(Table):
     )
     packing: description.Packing | None = Field(
         None,
-        description="lattice; rings along the surface (tube in 2D, cylinder, ball in 2D); or relaxed: particles that "
-        "pushed each other apart; default what suits",
+        description="lattice; rings along the surface of a tube, ball or cylinder, those of a ball in 3D in shells; or "
+        "relaxed: particles that pushed each other apart; default rings in cylinders, in 2D tubes and, if bonds hold "
+        "them, balls, relaxed in what no lattice fits, else lattice",
     )
     lattice_angle: quantity("rad") = Field(
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"

@@ -212,8 +212,10 @@ os.write(1, line.encode())  # at once: ranks share the pipe
 def test_memory_is_that_of_the_run(tmp_path, path, ranks):
     """Within 10 %, kernels compiled before."""
     changes = ["--set", "time.maximum_steps=20", "--set", f"output.directory={tmp_path}"]
-    for _ in range(2):  # the first run compiles, which takes memory of its own
-        told = run_ranks(ranks, ["-c", MEMORY, str(path), "--threads", "1", *changes], 280)
+    command = ["-c", MEMORY, str(path), "--threads", "1", *changes]
+    told = run_ranks(ranks, command, 280)
+    if "compiling kernel" in told:  # which takes memory of its own
+        told = run_ranks(ranks, command, 280)
     peaks = [float(bytes_) for bytes_ in re.findall(r"peak (\d+)", told)]  # not always at the start of a line
     assert len(peaks) == ranks
     assert Resources(load(path), ranks).memory() == pytest.approx(max(peaks), rel=0.1)
@@ -359,6 +361,7 @@ shape = { kind = "box", lower = LOWER, upper = UPPER }
         ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
         ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
         ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
+        ("water_air", ["fluid.regions.1.density=1.2"], "let go from 1e+09 to 5.41e+05 Pa"),
         (
             "shock_bubble",
             ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],

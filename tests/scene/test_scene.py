@@ -109,8 +109,9 @@ strength = { kind = "elastic", shear_modulus = "1 GPa" }
     assert scene.fluid.inflow == ((None, None),) * 3
     assert scene.solid.bodies[0].velocity == (0.0, 0.0, 0.0)
     body = "solid.bodies.one"
-    assert faults(text, f"{body}.packing=rings") == [
-        f"{body}.packing (--set): 'rings' need a tube or ball in 2D, or a cylinder"
+    box = f'{body}.shape={{kind="box", lower=[0.4, 0.4, 0.4], upper=[0.6, 0.6, 0.6]}}'
+    assert faults(text, f"{body}.packing=rings", box) == [
+        f"{body}.packing (--set): 'rings' need a tube, ball or cylinder, in 2D or 3D"
     ]
     assert faults(text, f"{body}.lattice_angle=30 deg", "domain.lower=[0.4, 0, 0]", "domain.x=symmetry") != []
     hollow = {"start": "[0, 0.5, 1]", "end": "[1, 0.5, 1]", "radius": "0.2", "inner_radius": "0.3"}

@@ -160,6 +160,25 @@ def test_a_ball_has_its_volume(dimensions):
     assert nearest(positions) == pytest.approx(np.full(len(positions), 0.1))
 
 
+@pytest.mark.parametrize("shape", [Ball((0.1, 0.2, 0.3), 0.5), Tube((0.1, 0.2, 0.3), 0.3, 0.5)], ids=["ball", "tube"])
+def test_shells_follow_a_round_surface(shape):
+    """Half a spacing deep everywhere, of exact volume and mirrored in the planes through the middle; a cap of the
+    surface has its share of the outermost shell."""
+    positions, volumes = pack(body(shape, 0.05, packing="rings"), (-1.0,) * 3, (1.0,) * 3)
+    assert volumes.sum() == pytest.approx(volume(shape), rel=1e-13)
+    x = positions - np.array([0.1, 0.2, 0.3])
+    r = np.linalg.norm(x, axis=1)
+    outer = r > r.max() - 1e-9
+    assert r.max() == pytest.approx(0.475) and r[~outer].max() < 0.43
+    mirrored = {tuple(row) for row in np.abs(x).round(9)}
+    assert len(positions) == 8 * len(mirrored)
+    apart = cKDTree(positions).query(positions, k=2)[0][:, 1]
+    assert apart.min() > 0.499 * 0.05 and apart.max() < 1.3 * 0.05  # around the middle they lie closest
+    for z in (0.0, 0.2, 0.4):
+        cap = volumes[outer & (x[:, 2] > z)].sum() / volumes[outer].sum()
+        assert cap == pytest.approx(0.5 * (1.0 - z / 0.475), abs=0.03)
+
+
 def test_a_tube_gets_rings():
     tube = Tube((0.0, 0.0), 0.030, 0.034)
     positions, volumes = pack(body(tube, 0.00025), (-0.08, -0.08), (0.08, 0.08))

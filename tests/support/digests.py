@@ -72,6 +72,10 @@ CASES: Mapping[str, Case] = {
     "airblast_far": Case(
         "airblast_far", settings=("domain.cells=115", "stages.0.domain.cells=130", "stages.0.time.end=20 us")
     ),
+    "bubble": Case("bubble", settings=("domain.cells=180", "stages.0.domain.cells=120", "stages.0.time.end=50 us")),
+    "undex_sphere": Case(
+        "undex_sphere", settings=("domain.cells=180", "stages.0.domain.cells=90", "stages.0.time.end=50 us")
+    ),
     "surface_burst": Case("surface_burst", settings=("domain.cells=[40, 30]",)),
     "wall_blast": Case(
         "wall_blast", settings=("domain.cells=[20, 12, 12]", "stages.0.domain.cells=100", "stages.0.time.end=40 us")
