@@ -34,6 +34,7 @@ from distfsi.output.progress import Progress
 from distfsi.output.records import Records
 from distfsi.output.requests import Request, Requests
 from distfsi.output.restart import Restart, find_restart
+from distfsi.output.status import Status
 from distfsi.output.storage import on_root, storage
 from distfsi.scene.description import Scene
 from distfsi.scene.warnings import warnings
@@ -108,7 +109,8 @@ def run(
     requests = Requests(directory / output.stop_file, scene.time.wall_clock_limit, output.restart_every, communicator)
     files = storage(output.hdf5, communicator)
     _refuse([*cache_faults(), *filter(None, [shortage(scene, communicator)])], communicator)
-    progress = Progress(scene.time.end, communicator)
+    status = Status(directory, communicator)
+    progress = Progress(scene.time.end, communicator, status)
     for note in scene.notes:
         progress.say(note)
     if communicator.rank == 0:
@@ -145,6 +147,7 @@ def run(
                         records.check(origin)
                     identity = _take_over(directory, origin is not None, communicator)
                     noted.enter_context(journal)
+                    noted.enter_context(status)
                 records.open(identity, origin)
                 if not origin:
                     if simulation.fluid and simulation.fluid.mapping:

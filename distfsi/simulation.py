@@ -30,6 +30,7 @@ from distfsi.output.requests import Request
 from distfsi.scene.description import Scene
 from distfsi.scene.description import Solid as SolidScene
 from distfsi.scene.packing import pack
+from distfsi.solid.loads import Loads
 from distfsi.solid.obstacles import Obstacles
 from distfsi.solid.solid import Solid
 from distfsi.solid.with_bars import SolidWithBars
@@ -69,6 +70,7 @@ class Simulation:
     solid: Solid | None
     coupling: Coupling | None
     timers: Timers
+    loads: Loads | None = None
     watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
     derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
@@ -105,7 +107,8 @@ class Simulation:
         if model and fluid and solid:
             coupled = COUPLINGS[scene.coupling.scheme]
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
-        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device))
+        loads = Loads(scene, solid, device) if scene.loads and isinstance(solid, Solid) else None
+        simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device), loads)
         if fluid and fluid.mapping:
             simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
@@ -150,7 +153,7 @@ class Simulation:
         find_forces(solid, coupling, self.timers)
         planned = self.time_step()
         self._refuse_short(planned)
-        return make_step(fluid, solid, coupling, planned, self.timers)
+        return make_step(fluid, solid, coupling, self.loads, planned, self.timers)
 
     def _refuse_short(self, planned: TimeStep) -> None:
         """Collective. Raise StepTooShort where a step is planned that would never get to the end of the run."""

@@ -22,6 +22,7 @@ from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
 from distfsi.output.requests import Request
 from distfsi.scene.description import Scene, Time
+from distfsi.solid.loads import Loads
 from distfsi.solid.protocol import Structure
 
 # Parts of a step by what is there, as timers count them; what is written and sampled between steps is "output".
@@ -134,12 +135,17 @@ def find_forces(solid: Structure | None, coupling: Coupling | None, timers: Time
 
 
 def make_step(
-    fluid: Fluid | None, solid: Structure | None, coupling: Coupling | None, planned: TimeStep, timers: Timers
+    fluid: Fluid | None,
+    solid: Structure | None,
+    coupling: Coupling | None,
+    loads: Loads | None,
+    planned: TimeStep,
+    timers: Timers,
 ) -> TimeStep:
     """Collective. Make the planned step of the parts that there are. Raises Diverged."""
     if coupling:
         return coupled_step(present(fluid), present(solid), coupling, planned, timers)
-    return fluid_step(fluid, planned, timers) if fluid else solid_step(present(solid), planned, timers)
+    return fluid_step(fluid, planned, timers) if fluid else solid_step(present(solid), loads, planned, timers)
 
 
 def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
@@ -161,11 +167,13 @@ def fluid_step(fluid: Fluid, planned: TimeStep, timers: Timers) -> TimeStep:
     raise StepFailed(f"{ATTEMPTS} attempts failed, the last with a step of {dt:.3g} s")
 
 
-def solid_step(solid: Structure, planned: TimeStep, timers: Timers) -> TimeStep:
+def solid_step(solid: Structure, loads: Loads | None, planned: TimeStep, timers: Timers) -> TimeStep:
     """Advance the solid by one step."""
     solid.body_force.average_over(planned.start, planned.dt)
     with timers("solid"):
         solid.advance(planned.dt)  # Eqs. 5-7
+        if loads:
+            loads.bear(planned.start, planned.dt)
         solid.migrate()
     return planned
 

@@ -20,9 +20,11 @@ from distfsi.interrupts import interrupts
 
 COMMANDS = (
     "run",
+    "new",
     "sweep",
     "check",
     "compile",
+    "watch",
     "plot",
     "report",
     "info",

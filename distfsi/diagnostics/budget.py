@@ -13,7 +13,6 @@ from distfsi.mesh.blocks import Snapshot
 from distfsi.narrowing import present
 from distfsi.solid.solid import Solid
 
-AXES = "xyz"
 SLOW = 1e-3  # of the speed of sound: where all is slower, errors of the momentum are measured by this speed
 
 
@@ -31,7 +30,7 @@ class Budget:
         grid = (fluid.blocks if fluid else present(solid).blocks).grid
         spanned = grid.dimensions + grid.coordinates.turns
         self._kg, impulse, self._joule = (per_extent(unit, spanned) for unit in ("kg", "N s", "J"))
-        self._momentum = [f"momentum_{AXES[d]} [{impulse}]" for d in range(self.dimensions)]
+        self._momentum = [f"momentum_{axis} [{impulse}]" for axis in grid.coordinates.axes[: self.dimensions]]
         masses = [f"mass_{k + 1} [{self._kg}]" for k in range(self.phases)]
         self.conserved = [*masses, *self._momentum, f"energy [{self._joule}]"]
         self._names = {n: name.split(" [")[0] for n, name in enumerate(self.conserved)}

@@ -8,11 +8,10 @@ import numpy as np
 
 from distfsi.coupling.kernels.cells import COVERED
 from distfsi.coupling.protocol import Coupling
+from distfsi.fluid import fields
 from distfsi.fluid.fluid import Fluid
 from distfsi.mesh.blocks import Grid
 from distfsi.mesh.regions import source_cell
-
-AXES = "xyz"
 
 
 class FluidSampler:
@@ -29,8 +28,8 @@ class FluidSampler:
         self.fluid, self.coupling = fluid, coupling
         self._primitives = fluid.model.formula("primitives")
         D, grid = fluid.model.dimensions, fluid.blocks.grid
-        self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in AXES[:D])]
-        self.columns += ["volume_fraction"] if fluid.model.phases == 2 else []
+        self.columns = ["pressure [Pa]", "density [kg/m3]", *(f"velocity_{a} [m/s]" for a in grid.coordinates.axes[:D])]
+        self.columns += fields.fraction_names(fluid.model)
         scaled = (positions - np.array(grid.lower[:D])) / np.array(grid.spacing[:D]) - 0.5
         if grid.coordinates.radial:
             scaled[:, 0] = _along_r(grid, positions[:, 0])
@@ -64,8 +63,8 @@ class FluidSampler:
         rows = rows[np.argsort(rows[:, 0])]
         U, covered = np.ascontiguousarray(rows[:, 1:-1].T), rows[:, -1] == 1.0
         W = self._primitives(U)
-        fraction = U[-1:] if P == 2 else U[:0]
-        cells = np.stack([W[P + D], U[:P].sum(axis=0), *W[P : P + D], *fraction], axis=1)
+        fractions = fields.written_fractions(self.fluid.model, U)
+        cells = np.stack([W[P + D], U[:P].sum(axis=0), *W[P : P + D], *fractions], axis=1)
         return self._interpolated(cells, covered)
 
     def _interpolated(self, cells: np.ndarray, covered: np.ndarray) -> np.ndarray:

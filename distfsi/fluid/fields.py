@@ -9,7 +9,20 @@ from distfsi.fluid.model import FluidModel
 
 def names(model: FluidModel) -> list[str]:
     """Of the fields that are written of cells; the velocity has three components."""
-    return ["density", "velocity", "pressure", *["volume_fraction"] * (model.phases == 2), *model.carried]
+    return ["density", "velocity", "pressure", *fraction_names(model), *model.carried]
+
+
+def fraction_names(model: FluidModel) -> list[str]:
+    """Of the volume fractions that are written: of two phases that of the first, of more that of each."""
+    if model.phases < 3:
+        return ["volume_fraction"] * (model.phases - 1)
+    return [f"volume_fraction_{name}" for name in model.names]
+
+
+def written_fractions(model: FluidModel, U: np.ndarray) -> list[np.ndarray]:
+    """Those fractions of states (variables, ...)."""
+    found = list(U[model.fraction : model.fraction + model.phases - 1])
+    return found if model.phases < 3 else [*found, 1.0 - sum(found)]
 
 
 def written(model: FluidModel, U: np.ndarray) -> dict[str, np.ndarray]:
@@ -17,7 +30,8 @@ def written(model: FluidModel, U: np.ndarray) -> dict[str, np.ndarray]:
     W, P, D = model.formula("primitives")(U), model.phases, model.dimensions
     velocity = np.zeros((*U.shape[1:], 3))
     velocity[..., :D] = np.stack(W[P : P + D], axis=-1)
-    return dict(zip(names(model), (U[:P].sum(axis=0), velocity, *W[P + D :]), strict=True))
+    behind = (W[P + D], *written_fractions(model, U), *W[2 * P + D :])
+    return dict(zip(names(model), (U[:P].sum(axis=0), velocity, *behind), strict=True))
 
 
 def speeds(model: FluidModel, U: np.ndarray) -> list[np.ndarray]:
@@ -44,6 +58,10 @@ def first_invalid(model: FluidModel, U: np.ndarray, ignored: np.ndarray | bool) 
 def _primitives(model: FluidModel) -> list[str]:
     """The names of the primitives."""
     phases, axes = range(model.phases), "xyz"[: model.dimensions]
-    fraction = ["volume fraction"] if model.phases == 2 else []
-    behind = ["pressure", *fraction, *model.carried]
+    fractions = (
+        [f"volume fraction {k + 1}" for k in phases[:-1]]
+        if model.phases > 2
+        else ["volume fraction"] * (model.phases - 1)
+    )
+    behind = ["pressure", *fractions, *model.carried]
     return [*(f"density_{k + 1}" for k in phases), *(f"velocity_{a}" for a in axes), *behind]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from ast import literal_eval
+from collections.abc import Mapping
+from itertools import count, takewhile
 from pathlib import Path
 
 import numpy as np
 
 from distfsi.coordinates import Coordinates
 from distfsi.errors import InputError
+from distfsi.laws.law import FluidEos
 from distfsi.laws.registry import laws_of
 from distfsi.narrowing import present
 from distfsi.output.restart import Restart, newest_restart
@@ -67,12 +70,11 @@ class FinishedRun:
 
     @property
     def _names_there(self) -> list[str]:
-        return [
-            key.removeprefix(PHASE) for key, value in self._there.items() if key.startswith(PHASE) and value == "Phase"
-        ]
+        return names_in(self._there)
 
     def _check_phases(self, scene: Scene) -> None:
-        """Each phase of the run is one of the scene, with the same equation of state; both count in float64."""
+        """Each phase of the run is one of the scene, with the same equation of state; cells hold energies that are
+        counted alike."""
         here, faults = describe(scene), []
         for name in self._names_there:
             if name not in self.names:
@@ -83,10 +85,23 @@ class FinishedRun:
             for key in sorted(here.keys() | self._there.keys())
             if key.startswith(alike) and here.get(key) != self._there.get(key)
         ]
-        if any(known["fluid.precision"] != repr("float64") for known in (here, self._there)):
-            faults.append("fluid.precision: only float64 can be mapped, not yet float32")
+        faults += self._unlike_energies(here)
         if faults:
             raise InputError(faults)
+
+    def _unlike_energies(self, here: Mapping[str, str]) -> list[str]:
+        """Faults of a precision that is another, and of phases whose energies are counted from another density."""
+        key, there = "fluid.precision", self._there
+        if here[key] != there[key]:
+            return [f"{key}: {here[key]}; was {there[key]} in {self.path}"]
+        if here[key] == repr("float64"):
+            return []
+        return [
+            f"fluid.regions: {name} has {first_density(here, name)} kg/m3 in its first one, from where float32 counts"
+            f" energies; was {first_density(there, name)} in {self.path}"
+            for name in self._names_there
+            if first_density(here, name) != first_density(there, name) and is_shifted(here[f"{PHASE}{name}.eos"])
+        ]
 
     def _arranged(self, state: np.ndarray, scene: Scene) -> np.ndarray:
         """`contents` from the run's conserved state (variables, layers or 1, shells)."""
@@ -105,3 +120,23 @@ class FinishedRun:
         rows = [*(masses[name] for name in self.names), *state[P : energy + 1]]
         rows += [fraction[self.names[0]]] if self.phases == 2 else []
         return np.stack([*rows, *state[energy + 1 + (P == 2) :], np.ones(state.shape[1:])])
+
+
+# ---- scenes as texts by key (output/scene_text.py) -------------------------------------------------------------------
+
+
+def names_in(scene: Mapping[str, str]) -> list[str]:
+    """The names of its phases."""
+    return [key.removeprefix(PHASE) for key, value in scene.items() if key.startswith(PHASE) and value == "Phase"]
+
+
+def first_density(scene: Mapping[str, str], name: str) -> str | None:
+    """The density of the first region of a phase; None: it has none."""
+    states = takewhile(lambda state: f"{state}.phase" in scene, (f"fluid.regions.{n}.state" for n in count()))
+    own = str(names_in(scene).index(name))
+    return next((scene[f"{state}.density"] for state in states if scene[f"{state}.phase"] == own), None)
+
+
+def is_shifted(eos: str) -> bool:
+    """Whether in float32 energies are counted from rest by the equation of state of this class."""
+    return any(kind.__name__ == eos and hasattr(kind, "shifted_reference") for kind in laws_of(FluidEos))

@@ -11,6 +11,7 @@ from distfsi.errors import Diverged
 from distfsi.fluid import fields
 from distfsi.fluid.force import GivenByForce
 from distfsi.fluid.hydrostatics import WeighedGhosts
+from distfsi.fluid.incoming import Incoming
 from distfsi.fluid.initial import InitialState
 from distfsi.fluid.kernels.records import StageTimes, States
 from distfsi.fluid.kernels.signals import fastest_signals
@@ -26,7 +27,6 @@ from distfsi.mesh.blocks import Blocks, Snapshot
 from distfsi.mesh.exchange import GhostExchange
 from distfsi.mesh.kernels.regions import copy_regions
 from distfsi.narrowing import present
-from distfsi.scene.description import Fluid as FluidOfScene
 from distfsi.scene.description import Scene
 
 
@@ -54,7 +54,7 @@ class Fluid:
         self.kernels = device.build([advance_tiles, fastest_signals], model.constants, model.bindings, real)
         buffers = [blocks.allocate(model.variables, np.dtype(real).type) for _ in range(3)]
         initial = InitialState(given, model, blocks.grid)
-        self.inflow = self._inflow_states(given, initial)
+        self._incoming = Incoming(given, initial, model.variables)
         for buffer in buffers:
             buffer[:] = initial.of(given.regions[0].state)[:, None, None, None]
         self.mapping = Mapping(given.map, scene, blocks) if given.map and not resumed else None
@@ -78,15 +78,12 @@ class Fluid:
         self.rejected_steps = 0
         self.reactions = Reactions(scene, model, blocks, device) if model.carried else None
 
-    def _inflow_states(self, given: FluidOfScene, initial: InitialState) -> np.ndarray:
-        states = np.zeros((3, 2, self.model.variables))
-        for axis, sides in enumerate(given.inflow):
-            for side, state in enumerate(sides):
-                if state is not None:
-                    states[axis, side] = initial.of(state)
-        return states
-
     # ---- one step ----------------------------------------------------------------------------------------------------
+
+    @property
+    def inflow(self) -> np.ndarray:
+        """States (3, 2, variables) that come in through the ends."""
+        return self._incoming.states
 
     @property
     def state(self) -> np.ndarray:
@@ -115,7 +112,9 @@ class Fluid:
         return self._buffers[_output(stage.number)].device
 
     def average_sources(self, start: float, dt: float) -> None:
-        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on."""
+        """From now on the body force is its mean over a step of `dt` [s] from `start` [s] on, and what comes in has the
+        state of its middle."""
+        self._incoming.set_time(start + 0.5 * dt)
         if self.model.body_force.average_over(start, dt):
             self.rest.wake()
 
@@ -273,7 +272,8 @@ class Fluid:
 
     def workload(self) -> np.ndarray:
         """(local blocks,) cells that a stage computes."""
-        return np.bincount(self.tiling.block, self.tiling.cells * ~self.rest.settled, self.blocks.local_count)
+        cells = self.tiling.cells * ~self.rest.settled
+        return np.bincount(self.tiling.block, cells, self.blocks.local_count).astype(float)  # of no tiles: integers
 
     def memory(self) -> int:
         """Bytes of this rank's fields."""
@@ -312,7 +312,7 @@ class Fluid:
 
     def held_energies(self) -> np.ndarray:
         """Collective. What each of the carried shares holds back in all ranks' cells (carried,) [J]."""
-        first = self.model.fraction + 1
+        first = self.model.variables - len(self.model.carried)
         shares = [
             self.metrics.weighted(self.cells(b)[first:].astype(np.float64), b).sum(axis=(1, 2, 3))
             for b in range(self.blocks.local_count)

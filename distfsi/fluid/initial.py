@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from distfsi.device.emit import plain
-from distfsi.fluid.formulas import relaxation, six_equation
-from distfsi.fluid.kernels.rows import HALVINGS
+from distfsi.fluid.formulas import phases, relaxation, relaxation_many, six_equation, six_equation_many
+from distfsi.fluid.kernels.rows import HALVINGS, bisected_changes
 from distfsi.fluid.layers import Layers, is_layer
 from distfsi.fluid.mapping import Mapping
 from distfsi.fluid.model import FluidModel
@@ -20,6 +20,10 @@ from distfsi.scene.fractions import Filled, cell_fractions, corrected
 from distfsi.scene.shapes import bounding_box, contains, volume_within
 from distfsi.scene.thermodynamics import pressure
 
+MANY = (six_equation_many, relaxation_many)
+RELAXATION = ("phases_before", "relaxed_fraction_change", "halved_range", "range_of_change")
+RELAXATION_MANY = ("phases_before", "relaxed_changes")
+WARM = 0.9  # of its pressure may be that of the cold curve where nothing is known of a phase
 ALIKE = 1e-9  # part by which pressures differ that are one
 
 
@@ -48,11 +52,11 @@ def fractions(blocks: Blocks, shape: Shape) -> list[np.ndarray | None]:
 
 
 class InitialState:
-    """Conserved states of the scene's regions, for one or two phases.
+    """Conserved states of the scene's regions.
 
-    A region is one phase. With two phases the other one is present in it, too, as much as the region's state says or as
-    a trace of `minimum_volume_fraction`, at the same pressure, on the isentrope through the first state the scene gives
-    for it.
+    A region is one phase. The others are present in it, too, as a trace of `minimum_volume_fraction` each or, of two
+    phases, as much as the region's state says, at the same pressure, on the isentropes through the first states that
+    the scene gives for them.
 
     layers  of those that are at rest under a body force, if that is asked for: regions with the pressure of the first
             one then have that of their layer, on the isentropes through their states
@@ -65,12 +69,16 @@ class InitialState:
         self._references, self._omegas = (
             [model.formula(f"{name}_{k + 1}") for k in range(model.phases)] for name in ("reference", "grueneisen")
         )
-        if model.phases == 2:
-            formulas = (six_equation.phase_energies, relaxation.phases_before, relaxation.relaxed_fraction_change)
-            self._energies, self._before, self._change, self._range, self._halved = (
-                plain(formula, model.constants, model.bindings)
-                for formula in (*formulas, relaxation.range_of_change, relaxation.halved_range)
+        if model.phases > 1:
+            of_states, of_pressures = (six_equation, relaxation) if model.phases == 2 else MANY
+            names = RELAXATION if model.phases == 2 else RELAXATION_MANY
+            formulas = [of_states.phase_energies, *(getattr(of_pressures, name) for name in names)]
+            formulas += [bisected_changes] * (model.phases > 2)
+            self._energies, self._before, self._relaxed, *self._to_the_end = (
+                plain(formula, model.constants, model.bindings) for formula in formulas
             )
+        if model.phases > 2:
+            self._bounded = plain(phases.bounded, model.constants)
         self.layers: Layers | None = None
         if fluid.hydrostatic_level is not None:
             self.layers = self._layers(grid, fluid.hydrostatic_level)
@@ -81,12 +89,11 @@ class InitialState:
 
     def _at_pressures(self, state: FluidState, pressures: np.ndarray) -> np.ndarray:
         """Conserved states (variables, n) on the isentropes through a `state`, at pressures (n,) [Pa]."""
-        densities = [self._on_isentrope(state.phase, state, pressures)]
-        fraction = []
-        if self.model.phases == 2:
-            trace = self._beside(state, pressures)
-            densities = [*densities, trace] if state.phase == 0 else [trace, *densities]
-            fraction = [self._fraction(state)]
+        densities = [
+            self._on_isentrope(k, state, pressures) if k == state.phase else self._beside(k, state, pressures)
+            for k in range(self.model.phases)
+        ]
+        fraction = self._fractions(state)
         shares = [1.0 if state.phase == self.model.constants["CARRIER"] else 0.0] * len(self.model.carried)
         conserved = self._conserved((*densities, *state.velocity, pressures, *fraction, *shares))
         return np.array([np.broadcast_to(values, pressures.shape) for values in conserved], dtype=float)
@@ -127,7 +134,7 @@ class InitialState:
     def _lay_over(self, cells: np.ndarray, new: np.ndarray, part: np.ndarray) -> None:
         """Let `new` states, as wide as `cells` (variables, z, y, x) or 1, fill a `part` (z, y, x) of each."""
         mixed = part * new + (1.0 - part) * cells
-        if self.model.phases == 2:
+        if self.model.phases > 1:
             cut = np.argwhere((part > 0.0) & (part < 1.0))
             here = np.broadcast_to(new, cells.shape)
             alike = self._alike(here[:, *cut.T], cells[:, *cut.T])
@@ -170,26 +177,52 @@ class InitialState:
         density of its region, a material that came from a high pressure would be colder than cold."""
         states, shares = (new, old), np.array((part, 1.0 - part))
         primitives = [self._primitives(U) for U in states]
-        lowest, U = min(self._pressure(state) for state in states), shares @ np.array(states)
+        lowest, U = min(float(self._pressure(state)) for state in states), shares @ np.array(states)
         energies = shares @ np.array([self._energies(W) for W in primitives])
-        at = self.model.fraction
-        fractions = (U[at], 1.0 - U[at])
-        densities = [m / a for m, a in zip(U[:2], fractions, strict=True)]
+        P, at = self.model.phases, self.model.fraction
+        fractions = (*U[at : at + P - 1], 1.0 - U[at : at + P - 1].sum())
+        densities = [m / a for m, a in zip(U[:P], fractions, strict=True)]
         references = [reference(rho)[0] for reference, rho in zip(self._references, densities, strict=True)]
         omegas = [omega(rho)[0] for omega, rho in zip(self._omegas, densities, strict=True)]
         excess = [
             omega * energy - a * (lowest - reference)
             for omega, energy, a, reference in zip(omegas, energies, fractions, references, strict=True)
         ]
-        phases = self._before(lowest, U[at], 0.0, U[0], U[1], *references, *excess)
-        change, settled = self._change(phases)
-        if settled < 0.0:
-            low, high = self._range(phases)
-            for _ in range(HALVINGS):
-                low, high = self._halved(phases, low, high)
-            change = 0.5 * (low + high)
-        U[at] += change
+        if P == 2:
+            U[at] += self._change_of_two(lowest, U, references, excess)
+        else:
+            changes = self._changes_of_many(lowest, U[:P], fractions, references, excess)
+            U[at : at + P - 1] = self._bounded(tuple(a + change for a, change in zip(fractions, changes, strict=True)))
         return U
+
+    def _change_of_two(self, lowest: float, U: np.ndarray, references: list[float], excess: list[float]) -> float:
+        """Change of the volume fraction of a state (variables,) at which two phases have one pressure."""
+        halved_range, range_of_change = self._to_the_end
+        found = self._before(lowest, U[self.model.fraction], 0.0, U[0], U[1], *references, *excess)
+        change, settled = self._relaxed(found)
+        if settled < 0.0:
+            low, high = range_of_change(found)
+            for _ in range(HALVINGS):
+                low, high = halved_range(found, low, high)
+            change = 0.5 * (low + high)
+        return float(change)
+
+    def _changes_of_many(
+        self,
+        lowest: float,
+        masses: np.ndarray,
+        fractions: tuple[float, ...],
+        references: list[float],
+        excess: list[float],
+    ) -> tuple[float, ...]:
+        """Changes of the volume fractions at which more phases have one pressure."""
+        still = (0.0,) * len(fractions)
+        found = self._before(lowest, fractions, still, tuple(masses), tuple(references), tuple(excess))
+        changes, settled = self._relaxed(found)
+        if settled < 0.0:
+            (to_the_end,) = self._to_the_end
+            changes = to_the_end(found)
+        return tuple(changes)
 
     def at(self, positions: np.ndarray) -> np.ndarray:
         """States (variables, n) at points (n, D) [m]."""
@@ -202,18 +235,28 @@ class InitialState:
             states[:, inside] = of_region
         return states
 
-    def _fraction(self, state: FluidState) -> float:
-        given = state.volume_fraction
+    def _fractions(self, state: FluidState) -> tuple[float, ...]:
+        """Volume fractions of all phases but the last in a region of `state`."""
+        P, given = self.model.phases, state.volume_fraction
         other = self.fluid.minimum_volume_fraction if given is None else 1.0 - given
-        return 1.0 - other if state.phase == 0 else other
+        whole = 1.0 - (P - 1) * other
+        found = tuple(whole if k == state.phase else other for k in range(P - 1))
+        return found if P < 3 else tuple(self._bounded(found))
 
-    def _beside(self, state: FluidState, pressures: np.ndarray) -> np.ndarray:
-        """Densities (n,) of the other phase in a region of `state`, at pressures (n,)."""
-        other = 1 - state.phase
+    def _beside(self, other: int, state: FluidState, pressures: np.ndarray) -> np.ndarray:
+        """Densities (n,) of another phase in a region of `state`, at pressures (n,)."""
         known = self._products() if self._is_explosive(other) else self._first_state(other)
         if known is None:
-            return np.full(pressures.shape, min(state.density, 0.5 * self.model.eos[other].maximum_density))
+            return np.full(pressures.shape, self._warm_density(other, state))
         return self._on_isentrope(other, known, pressures)
+
+    def _warm_density(self, other: int, state: FluidState) -> float:
+        """Density of a phase that the scene has nowhere: at the pressure of a state it is not colder than cold."""
+        eos = self.model.eos[other]
+        density = min(state.density, 0.5 * eos.maximum_density)
+        while eos.cold_curve(density)[0] > WARM * max(state.pressure, 0.0) > 0.0:
+            density *= 0.5
+        return density
 
     def _first_state(self, phase: int) -> FluidState | None:
         """That the scene gives for a phase."""

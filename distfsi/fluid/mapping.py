@@ -98,7 +98,7 @@ class Mapping:
         given = contents[:-1, touched] / volume[touched]
         shape = cells.shape[1:]
         old = cells.reshape(len(cells), -1)[:, touched]
-        rest = (1.0 - share[touched]) * old
+        rest = (1.0 - share[touched]) * old.astype(np.float64)
         new = rest.copy()
         P = run.phases
         distance = np.sqrt((center[touched][:, self._shells.across] ** 2).sum(axis=1))
@@ -113,8 +113,8 @@ class Mapping:
         flat = cells.reshape(len(cells), -1)
         flat[:, touched] = new
         cells[:] = flat.reshape(len(cells), *shape)
-        # what has arrived, from the new states
-        got = (new - rest) * volume[touched]
+        # what has arrived, from the new states as they are kept
+        got = (flat[:, touched].astype(np.float64) - rest) * volume[touched]
         across = list(self._shells.across)
         radial = (got[[P + axis for axis in across]] * directions[:, across].T).sum(axis=0)
         axial = [got[P + self._along].sum()] if run.layers is not None else []

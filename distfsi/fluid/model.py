@@ -17,14 +17,17 @@ from distfsi.device.source import Bound
 from distfsi.fluid.formulas import (
     euler,
     five_equation,
+    five_equation_many,
     hydrostatics,
     limiters,
     positivity,
     reconstruction,
     relaxation,
+    relaxation_many,
     riemann,
+    six_equation,
+    six_equation_many,
 )
-from distfsi.fluid.formulas import six_equation as two_phase
 from distfsi.laws.body_force import BodyForce
 from distfsi.laws.law import FluidEos
 from distfsi.narrowing import of_kind, present
@@ -44,13 +47,16 @@ RIEMANN_SOLVERS: dict[str, tuple[Callable[..., Any], ...]] = {
     "rusanov": (riemann.rusanov_speeds, riemann.contact_diffusion, riemann.inviscid),
     "adaptive": (riemann.einfeldt_speeds, riemann.sharp, riemann.shear_along_shocks),
 }
-TWO_PHASE_MODELS = {"six_equation": (two_phase, 3), "five_equation": (five_equation, 1)}  # fluxes beyond the state's
+MODELS = {  # of two phases, and of more
+    "six_equation": (six_equation, six_equation_many),
+    "five_equation": (five_equation, five_equation_many),
+}
 
 
 @dataclass(frozen=True)
 class FluidModel:
     """Everything the fluid's kernels are specialised with, and the meaning of its variables; `carried`: what the shares
-    are called that a phase carries."""
+    are called that a phase carries; `names`: those of the phases."""
 
     constants: dict[str, object]
     bindings: dict[str, Bound]
@@ -58,6 +64,7 @@ class FluidModel:
     dimensions: int
     body_force: BodyForce
     carried: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -71,12 +78,12 @@ class FluidModel:
 
     @property
     def fraction(self) -> int:
-        """Index of the volume fraction of two phases."""
+        """Index of the first volume fraction of several phases."""
         return self.conserved
 
     @property
     def conserved(self) -> int:
-        """Masses, momentum and energy; the volume fraction behind them is not conserved."""
+        """Masses, momentum and energy; volume fractions behind them are not conserved."""
         return self.phases + self.dimensions + 1
 
     @property
@@ -105,8 +112,10 @@ def fluid_model(scene: Scene) -> FluidModel:
     dimensions, phases = scene.domain.dimensions, len(fluid.phases)
     eos = tuple(phase.eos for phase in fluid.phases)
     carried = held_energies(fluid)
-    variables = phases + dimensions + 1 + (phases == 2) + len(carried)
-    model, more_fluxes = TWO_PHASE_MODELS[fluid.model] if phases == 2 else (euler, 0)
+    variables = 2 * phases + dimensions + len(carried)
+    model = euler if phases == 1 else MODELS[fluid.model][phases > 2]
+    relaxes = phases > 1 and fluid.model == "six_equation"
+    closed = all(e.closed_form for e in eos)
     reconstructed, limiter, ghosts = RECONSTRUCTIONS[fluid.reconstruction]
     asymmetric = reconstructed is reconstruction.weno5
     body_force, radial = BodyForce(scene.sources, dimensions), scene.domain.coordinates.radial
@@ -114,19 +123,19 @@ def fluid_model(scene: Scene) -> FluidModel:
         "DIMENSIONS": dimensions,
         "PHASES": phases,
         "VARIABLES": variables,
-        "FLUXES": variables + more_fluxes,
+        "FLUXES": variables + (phases if relaxes else 0) + (phases > 1),
         "CARRIED": len(carried),
         "CARRIER": carrier_of(fluid),
         "HELD_ENERGY": tuple(carried.values()),
         "BURNS": fluid.detonation is not None,
         "AFTERBURNS": fluid.afterburn is not None,
-        "RELAXES": model is two_phase,
+        "RELAXES": relaxes,
         "BODY_FORCE": body_force.acceleration,
         "MINIMUM_FRACTION": fluid.minimum_volume_fraction,
-        "CLOSED_FORM": all(e.closed_form for e in eos),
-        "BISECTION_FALLBACK": model is two_phase and not all(e.closed_form for e in eos),
+        "CLOSED_FORM": closed,
+        "BISECTION_FALLBACK": relaxes and (phases > 2 or not closed),
         "GHOSTS": ghosts,
-        "SHARPENED": phases == 2 and (fluid.sharpening or asymmetric),
+        "SHARPENED": phases > 1 and (fluid.sharpening or asymmetric),
         "ASYMMETRIC": asymmetric or radial,
         "TRANSVERSE_SENSOR": dimensions > 1 and fluid.riemann == "adaptive",
         "HYDROSTATIC": any(body_force.acceleration),
@@ -136,9 +145,13 @@ def fluid_model(scene: Scene) -> FluidModel:
     }
     names = ("primitives", "conserved", "face_flux", "updated", "bulk_modulus", "sound_speed")
     bindings = {name: Bound(getattr(model, name)) for name in names}
-    if constants["BISECTION_FALLBACK"]:
-        bindings |= {name: Bound(getattr(two_phase, name)) for name in ("before_relaxation", "fraction_after")}
+    if constants["BISECTION_FALLBACK"] and phases == 2:
+        bindings |= {name: Bound(getattr(model, name)) for name in ("before_relaxation", "fraction_after")}
         bindings |= {name: Bound(getattr(relaxation, name)) for name in ("range_of_change", "halved_range")}
+    elif constants["BISECTION_FALLBACK"]:
+        bindings |= {name: Bound(getattr(model, name)) for name in ("before_relaxation", "fractions_after")}
+        halving = ("range_of_pressure", "range_of_growths", "halved_growths", "changes_between")
+        bindings |= {name: Bound(getattr(relaxation_many, name)) for name in halving}
     if constants["HYDROSTATIC"]:
         bindings |= {name: Bound(getattr(hydrostatics, name)) for name in ("falls", "beyond_rest")}
     bindings["state_behind_wave"] = Bound(model.behind_wave)
@@ -159,7 +172,9 @@ def fluid_model(scene: Scene) -> FluidModel:
         bindings["unburnt_share"] = Bound.of(fluid.detonation.burn, "unburnt", "burn")
     if fluid.afterburn:
         bindings["afterburn_left"] = Bound.of(fluid.afterburn.law, "left", "afterburn")
-    return FluidModel(constants, bindings, eos, dimensions, body_force, tuple(carried))
+    return FluidModel(
+        constants, bindings, eos, dimensions, body_force, tuple(carried), tuple(p.name for p in fluid.phases)
+    )
 
 
 def carrier_of(fluid: Fluid) -> int:

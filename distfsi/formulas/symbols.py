@@ -31,42 +31,51 @@ TRANSFERRED = Symbol("transfer components: values that a cell gives to the parti
 
 # ---- fluid -----------------------------------------------------------------------------------------------------------
 
-PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 (six- or five-equation model)")
+PHASES = Symbol("number of fluid materials: 1 (Euler) or 2 to 5 (six- or five-equation model)")
 VARIABLES = Symbol(
-    "stored fields per cell: PHASES + DIMENSIONS + 1, of two phases the volume fraction, and what is CARRIED"
+    "stored fields per cell: PHASES + DIMENSIONS + 1, volume fractions of all phases but one, and what is CARRIED"
 )
 CARRIED = Symbol("how many shares a phase carries along, each of which holds back an energy from the pressure")
 CARRIER = Symbol("index of that phase")
 HELD_ENERGY = Symbol("energy that each of the carried shares holds back [J/kg]")
 BURNS = Symbol("whether the first of the shares is that of an explosive that is unburnt")
 AFTERBURNS = Symbol("whether the last of the shares is that of products that is left to burn with air")
-RELAXES = Symbol("whether two phases come to one pressure by changes of their volumes")
+RELAXES = Symbol("whether phases come to one pressure by changes of their volumes")
 FLUXES = Symbol(
-    "values per face: VARIABLES, for two phases the face velocity, before it in six equations both energies"
+    "values per face: VARIABLES, of several phases the face velocity, before it in six equations their energies"
 )
 BODY_FORCE = Symbol("body force per mass, one component per dimension [m/s2], the mean over the step")
 MINIMUM_FRACTION = Symbol("volume fractions stay within this distance of 0 and 1")
 REST_DENSITY = Symbol("density at which energies that are counted from rest vanish with the pressure [kg/m3]")
-CLOSED_FORM = Symbol("whether the pressures of two phases relax along hyperbolas, to the root of a quadratic")
+CLOSED_FORM = Symbol("whether phases relax along hyperbolas: two of them to the root of a quadratic")
 
 FRACTIONAL = Symbol("whether cells beside a wall that moves may hold more or less fluid than their volume")
 BISECTION_FALLBACK = Symbol("whether relaxation may need more than its fixed number of fits: then bisection")
 GHOSTS = Symbol("layers of ghost cells: how many cells on each side a face looks at")
 RADIAL = Symbol("whether the first axis is the distance from a point or an axis (coordinates/)")
 SHARES = Symbol("parts of a cell's change that the limiter looks at: its faces, and in r what their areas differ by")
-SHARPENED = Symbol("whether the volume fraction has a reconstruction of its own")
+SHARPENED = Symbol("whether volume fractions have a reconstruction of its own")
 ASYMMETRIC = Symbol("whether the increments from a cell's mean to its two faces differ")
 HYDROSTATIC = Symbol("whether a body force acts, whose weight the pressures of cells beside each other differ by")
 TRANSVERSE_SENSOR = Symbol("whether the flux of a face depends on pressures beside its two cells")
 
 reference_1 = chosen("reference_1", "phase 1: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 reference_2 = chosen("reference_2", "phase 2: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+reference_3 = chosen("reference_3", "phase 3: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+reference_4 = chosen("reference_4", "phase 4: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
+reference_5 = chosen("reference_5", "phase 5: rho -> (reference pressure [Pa], its slope with rho [m2/s2])")
 grueneisen_1 = chosen("grueneisen_1", "phase 1: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
 grueneisen_2 = chosen("grueneisen_2", "phase 2: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
+grueneisen_3 = chosen("grueneisen_3", "phase 3: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
+grueneisen_4 = chosen("grueneisen_4", "phase 4: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
+grueneisen_5 = chosen("grueneisen_5", "phase 5: rho -> (Grueneisen coefficient omega, its slope with rho [m3/kg])")
 stored_reference_1 = chosen(
     "stored_reference_1", "as reference_1, to the energy that is stored: p = reference + omega rho e"
 )
 stored_reference_2 = chosen("stored_reference_2", "as reference_2, to the energy that is stored")
+stored_reference_3 = chosen("stored_reference_3", "as reference_3, to the energy that is stored")
+stored_reference_4 = chosen("stored_reference_4", "as reference_4, to the energy that is stored")
+stored_reference_5 = chosen("stored_reference_5", "as reference_5, to the energy that is stored")
 limited_slope = chosen("limited_slope", "(backward difference, forward difference) -> limited slope")
 reconstructed = chosen(
     "reconstructed",
@@ -75,7 +84,7 @@ reconstructed = chosen(
 reconstructed_in_r = chosen(
     "reconstructed_in_r", "as reconstructed along r, with the nearness to both sides, and the way from the low face"
 )
-sharpened = chosen("sharpened", "as reconstructed, of the volume fraction")
+sharpened = chosen("sharpened", "as reconstructed, of volume fractions")
 falls = chosen("falls", "time step, and that over the size of a cell along three axes -> g h along each [m2/s2]")
 beyond_rest = chosen("beyond_rest", "pressures and densities of cells around one, g h -> pressures without the weight")
 primitives = chosen("primitives", "conserved state -> primitive state")

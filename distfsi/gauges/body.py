@@ -15,8 +15,9 @@ QUANTITIES = {"force": "N", "velocity": "m/s", "displacement": "m", "momentum": 
 
 @dataclass(frozen=True)
 class BodyGauge(Gauge):
-    """A body as a whole: the fluid's mean force on it in the last step, velocity and displacement of its center of
-    mass, momentum, and the impulse that the fluid has given to it so far; of what has not left the domain."""
+    """A body as a whole: the mean force of the fluid or of loads on it in the last step, velocity and displacement
+    of its center of mass, momentum, and the impulse that these have given to it so far; of what has not left the
+    domain."""
 
     body: str = entry("name of the body")
     every: float | None = each_step()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from distfsi.gauges import AXES, Gauge, Kept, PressureRecord, Run, TableProbe, each_hundredth
+from distfsi.gauges import Gauge, Kept, PressureRecord, Run, TableProbe, each_hundredth
 from distfsi.laws.law import entry, vector
 
 
@@ -35,7 +35,7 @@ class LineProbe(TableProbe):
     def __init__(self, gauge: LineGauge, run: Run):
         self._positions = np.linspace(gauge.start, gauge.end, gauge.points)
         self._points, self._record = run.fluid_points(self._positions), PressureRecord(gauge.points)
-        positions = [f"{axis} [m]" for axis in AXES[: self._positions.shape[1]]]
+        positions = [f"{axis} [m]" for axis in run.blocks.grid.coordinates.axes[: self._positions.shape[1]]]
         self.columns = [*positions, *self._points.columns, *PressureRecord.columns]
 
     def rows(self, run: Run) -> np.ndarray:

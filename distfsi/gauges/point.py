@@ -13,7 +13,7 @@ from distfsi.laws.law import vector
 
 @dataclass(frozen=True)
 class PointGauge(Gauge):
-    """The fluid at a point: pressure, density, velocity and, with two phases, volume fraction, overpressure and its
+    """The fluid at a point: pressure, density, velocity and, of several phases, volume fractions, overpressure and its
     impulse in gauges/NAME.csv. Values are linear between cell centers; covered cells do not count, and in a covered
     cell there is no value (nan)."""
 

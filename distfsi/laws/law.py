@@ -23,6 +23,7 @@ class Entry:
     meaning  in words
     unit     SI, "1" for a pure number; None: of what is no quantity, the type of the field says what it is
     vector   whether it is one number per dimension
+    series   whether it is any number of numbers
     limits   by name, "above", "at_least", "below", "at_most", in SI
     default  of the input, or NEEDED
     key      in the input, where it is not the field's name
@@ -34,6 +35,7 @@ class Entry:
     default: object
     vector: bool = False
     key: str | None = None
+    series: bool = False
 
 
 def quantity(unit: str, meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -49,6 +51,11 @@ def number(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
 def vector(unit: str, meaning: str, *, default: object = NEEDED, key: str | None = None) -> Any:
     """A field that has a number in this unit for each dimension; `key` in the input, if that is not its name."""
     return field(metadata={"entry": Entry(meaning, unit, {}, default, vector=True, key=key)})
+
+
+def series(unit: str, meaning: str) -> Any:
+    """A field that has any number of numbers in this unit, at least one."""
+    return field(metadata={"entry": Entry(meaning, unit, {}, NEEDED, series=True)})
 
 
 def entry(meaning: str, *, default: object = NEEDED, **limits: float) -> Any:
@@ -124,14 +131,18 @@ class Burn(Law):
 
 class Afterburn(Law):
     """How products of detonation burn with air. Their phase carries the share that is left, which holds back `energy`
-    [J/kg]."""
+    [J/kg].
+
+    needs_air  whether the phase beside them must be a gas
+    """
 
     folder = "laws/afterburn"
+    needs_air: ClassVar[bool] = False
     energy: float
 
-    def left(self, share, unburnt, pressure, dt):
+    def left(self, share, unburnt, pressure, air, dt):
         """A formula for kernels: the share that is left after `dt` [s] at a pressure [Pa], where a share of the
-        explosive is `unburnt`."""
+        explosive is `unburnt`, and `air` is the mass of the other phase per mass of this one."""
         raise NotImplementedError
 
 
@@ -324,3 +335,18 @@ class Source(Law):
     def share(self, start: float, end: float) -> float:
         """The mean of the share over the time from `start` to `end` [s], which may be the same."""
         raise NotImplementedError
+
+
+class PressureHistory(Law):
+    """What comes in through an end of the domain: an overpressure that changes in time."""
+
+    folder = "laws/histories"
+
+    def overpressure(self, time: float) -> float:
+        """[Pa], beyond the pressure of the inflow's state, at a `time` [s]."""
+        raise NotImplementedError
+
+    @property
+    def lowest(self) -> float:
+        """The lowest overpressure of all times [Pa]."""
+        return 0.0

@@ -28,7 +28,7 @@ NAME = "manifest.jsonl"
 DEPTH = 3  # folders from a file up to the directory of its run: gauges/NAME/FILE
 FIELD_FILES = r"(cells|particles)(-\d{6,}\.vtkhdf|\.vtkhdf\.series)"
 RESERVED = re.compile(
-    rf"((history|performance|balance)\.csv|run\.(json|lock)|summary\.png|{FIELD_FILES}|restart-\d{{8,}}\.h5"
+    rf"((history|performance|balance)\.csv|run\.(json|lock)|status\.txt|summary\.png|{FIELD_FILES}|restart-\d{{8,}}\.h5"
     rf"|{re.escape(NAME)})(\.tmp)?"
 )
 FIELDS = re.compile(rf"{FIELD_FILES}(\.tmp)?")

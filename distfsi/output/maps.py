@@ -36,7 +36,7 @@ COVERED = "0.82"  # color of cells that hold no fluid
 BESIDE = (
     1.6  # such cells that are no farther [cells] from fluid than this are drawn like it, where particles lie over them
 )
-MIXED, BOUNDARY = "volume_fraction", "white"  # of the first phase; color of the line where it is a half
+MIXED, BOUNDARY = "volume_fraction", "white"  # how fields of shares begin; color of the line where one is a half
 
 
 @dataclass(frozen=True)
@@ -186,14 +186,23 @@ def _draw_field(axes: Iterable[Axes], frames: Sequence[Frame], colors: Colors, l
         norm, edges = of_kind(Normalize, colors.map.norm), (left, right, low, high)
         map = present(colors.map.cmap).with_extremes(bad=COVERED)
         panel.imshow(image, origin="lower", extent=edges, norm=norm, cmap=map, aspect="auto")
-        if is_mixed(frame):
-            _draw_boundary(panel, frame.cells[MIXED], edges)
+        for share in _shares(frame):
+            if _has_boundary(share):
+                _draw_boundary(panel, share, edges)
 
 
 def is_mixed(frame: Frame) -> bool:
-    """Whether two materials meet in a plane of cells, and not only bodies between them."""
-    share = frame.cells.get(MIXED)
-    if share is None or min(share.shape) == 1:
+    """Whether materials meet in a plane of cells, and not only bodies between them."""
+    return any(_has_boundary(share) for share in _shares(frame))
+
+
+def _shares(frame: Frame) -> list[np.ndarray]:
+    """The volume fractions that cells know: of two materials that of the first, of more that of each."""
+    return [share for name, share in frame.cells.items() if name.startswith(MIXED)]
+
+
+def _has_boundary(share: np.ndarray) -> bool:
+    if min(share.shape) == 1:
         return False
     return any(
         bool((np.diff(share > 0.5, axis=axis) & np.isfinite(np.diff(share, axis=axis))).any()) for axis in (0, 1)

@@ -81,6 +81,8 @@ def _draw_profile(axes: Axes, name: str, frames: Sequence[Frame], fitted: Sequen
 
 def _profile_names(frames: Sequence[Frame], names: Sequence[str]) -> list[str]:
     """Those of the fields that are worth a row: not zero everywhere at all times."""
+    fractions = sorted({name for f in frames for name in f.cells if name.startswith("volume_fraction_")})
+    names = [*names, *(fractions if "volume_fraction" in names else [])]
     return [name for name in names if largest(values for f in frames for _, values, _ in _curves(f, name)) > 0.0]
 
 

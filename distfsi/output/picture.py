@@ -86,6 +86,6 @@ def remark(frames: Sequence[Frame], notes: Mapping[str, Any]) -> str:
     """Where the plane of the frames lies, and what the line in them means."""
     words = [frames[0].location] if frames[0].location else []
     phases = notes.get("phases", ())
-    if len(phases) == 2 and any(is_mixed(frame) for frame in frames):
-        words.append(f"white line: between {phases[0]} and {phases[1]}")
+    if len(phases) > 1 and any(is_mixed(frame) for frame in frames):
+        words.append(f"white line: between {', '.join(phases[:-1])} and {phases[-1]}")
     return "; ".join(words)

@@ -134,7 +134,8 @@ def _draw_planes(
     names = [name] if name else []
     what = "-".join(filter(None, (name, particles))) or "particles"
     colors = _particle_colors(film, numbers, names, particles)
-    shown = [*names, *({MIXED} & set(film.cell_fields) - set(names))]
+    mixed = [name for name in film.cell_fields if name.startswith(MIXED)]
+    shown = [*names, *(name for name in mixed if name not in names)]
     for number, frame in zip(numbers, film.frames(numbers, shown), strict=True):
         sheet = Sheet(frame.aspect, len(fields), 1, colors is not None, MAP_WIDTH, MAP_HEIGHT)
         with matplotlib.rc_context(STYLE):

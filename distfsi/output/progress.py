@@ -13,16 +13,18 @@ from rich.progress import Progress as RichProgress
 from rich.table import Column
 
 from distfsi.output.interfaces import Communicator
+from distfsi.output.status import Status
 
 SECONDS_BETWEEN_LINES = 5.0
 SECONDS_BETWEEN_REDRAWS = 0.2
 
 
 class Progress:
-    """Reports on rank 0 how far the run to `end_time` [s] is: a bar on a terminal, else a line every few seconds."""
+    """Reports on rank 0 how far the run to `end_time` [s] is: a bar on a terminal, else a line every few seconds; and
+    in the file of its `status`."""
 
-    def __init__(self, end_time: float, communicator: Communicator):
-        self._end_time = end_time
+    def __init__(self, end_time: float, communicator: Communicator, status: Status | None = None):
+        self._end_time, self._status = end_time, status
         self._shown = communicator.rank == 0
         self._bar = self._start_bar() if self._shown and sys.stdout.isatty() else None
         self._interval = SECONDS_BETWEEN_REDRAWS if self._bar else SECONDS_BETWEEN_LINES
@@ -35,7 +37,10 @@ class Progress:
         now = clock.monotonic()
         if self._shown and now - self._compiled_at >= self._interval:
             self._compiled_at = now
-            self._show(f"compiling kernel {number}, once for this kind of scene")
+            what = f"compiling kernel {number}, once for this kind of scene"
+            self._show(what)
+            if self._status:
+                self._status.note(what)
 
     def update(self, step: int, time: float, dt: float, limited_by: str, extra: str = "") -> None:
         """Report step number `step`, which reached `time` [s] with `dt` [s]; `limited_by` says what set `dt`."""
@@ -57,6 +62,16 @@ class Progress:
             extra,
         ]
         self._show("  ".join(part for part in parts if part), time)
+        if self._status:
+            share = 100.0 * time / self._end_time
+            lines = {
+                "step": f"{step:,}",
+                "time": f"{format_time(time)} of {format_time(self._end_time)} ({share:.0f} %)",
+                "time step": f"{format_time(dt)}, limited by {limited_by}",
+                "speed": f"{rate:.3g} steps/s",
+                "left": format_duration(left),
+            }
+            self._status.note("running", lines)
 
     def say(self, message: str) -> None:
         """Print `message`; the run goes on."""

@@ -20,7 +20,7 @@ from distfsi.output.scales import DECADES, largest, norm_of, scaled
 
 WIDTH, PANEL_HEIGHT, GAP, FOOT = 10.0, 1.9, 0.65, 0.3  # inches
 COLUMNS, TIMES = 2, 5
-COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[xyz]{1,2}))?( \[(?P<unit>.*)\])?")
+COLUMN = re.compile(r"(?P<name>.*?)(_(?P<part>[rxyz]{1,2}))?( \[(?P<unit>.*)\])?")
 FIRST = ("overpressure", "impulse")  # what a reader of a blast looks for
 CONSTANT = 1e-9  # relative: a quantity that varies by less is told, not drawn
 
@@ -34,7 +34,7 @@ def draw_gauge(name: str, table: Table, location: str = "") -> Figure:
     impulse first; the others are told below. `location`: where the gauge is, in words."""
     table = dict(table)
     time = table.pop("time [s]")
-    line = [table.pop(f"{axis} [m]") for axis in "xyz" if f"{axis} [m]" in table]
+    line = [table.pop(f"{axis} [m]") for axis in "rxyz" if f"{axis} [m]" in table]
     if line:
         along, label, groups, labels = _along_line(time, np.stack(line, axis=1), table)
     else:

@@ -27,7 +27,7 @@ from distfsi.simulation import deal_blocks
 PROCESS_BYTES = 140e6  # of a rank that has no blocks: Python and its libraries
 KERNEL_BYTES = 102e6  # of numba and compiled kernels: of a fluid where there are blocks, of solids on all ranks
 DRAWING_BYTES, PICTURE_BYTES = 45e6, 25e6  # on the first rank: of matplotlib, of the maps of a fluid in the summary
-COUPLING_BYTES = 27e6  # of the compiled kernels of a coupling, per dimension
+COUPLING_BYTES = 20e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
     "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 4300.0},
     "updated_lagrangian": {1: 900.0, 2: 1250.0, 3: 2800.0},
@@ -156,7 +156,8 @@ class Resources:
 
     def cell_file_bytes(self) -> int:
         """Bytes per cell of a field file: density, pressure, velocity and what else the scene has or asks for."""
-        scalars = 2 + (len(present(self.scene.fluid).phases) == 2)
+        phases = len(present(self.scene.fluid).phases)
+        scalars = 2 + (phases if phases > 2 else phases - 1)  # pressure, density, volume fractions
         scalars += 4 * bool(self.scene.output.peaks) + self.scene.output.schlieren
         return VECTOR + FLOAT * scalars
 
@@ -207,7 +208,8 @@ class Resources:
         fluid, D = present(self.scene.fluid), self.dimensions
         eos = {type(phase.eos) for phase in fluid.phases}
         two = "shock_bubble" if eos == {IdealGas} else "water_air" if eos <= {IdealGas, StiffenedGas} else "tnt_air"
-        rate = bench[f"{two if len(fluid.phases) == 2 else 'euler'}_2d"]["cell_stages_per_second"]
+        phases = len(fluid.phases)
+        rate = bench[f"{two if phases > 1 else 'euler'}_2d"]["cell_stages_per_second"] * min(2.0 / phases, 1.0)
         bubble = bench["shock_bubble_2d"]["cell_stages_per_second"]
         rate *= bench[f"shock_bubble_{D}d"]["cell_stages_per_second"] / bubble
         if fluid.precision == "float32":

@@ -33,7 +33,8 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
     if domain.coordinates.radial:
         lines.append(_line("symmetry", f"{word_of(type(domain.coordinates))}; totals of {domain.coordinates.whole}"))
     if scene.fluid:
-        names = " and ".join(phase.name for phase in scene.fluid.phases)
+        *first, last = (phase.name for phase in scene.fluid.phases)
+        names = f"{', '.join(first)} and {last}" if first else last
         lines.append(_line("fluid", f"{names}; {resources.cells:,} cells"))
     for body in scene.solid.bodies if scene.solid else ():
         lines.append(_line("body", _body(body, len(resources.positions[body.name]), scene)))
@@ -47,7 +48,10 @@ def report(scene: Scene, ranks: int = 1, threads: int = 1, bench: Mapping[str, A
         _line("time", _time(resources, threads, bench)),
     ]
     lines += [_line("note", text) for text in scene.notes]
-    return "\n".join(lines + [_line("advice", text) for text in advice(scene, resources.layout)])
+    given = list(advice(scene, resources.layout))
+    if not given:
+        lines.append(_line("verdict", "well posed: nothing is known that makes results wrong, or costs without use"))
+    return "\n".join(lines + [_line("advice", text) for text in given])
 
 
 def charge_lines(scene: Scene) -> Iterator[tuple[str, str]]:

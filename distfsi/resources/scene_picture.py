@@ -24,15 +24,16 @@ BAND = 0.2  # height over length of a scene in one dimension
 
 
 def draw_scene(scene: Scene, path: Path) -> Iterator[Path]:
-    """Draw sections of `scene` into the file `path` and, of one in 3D where vtk is installed, a view beside it; the
-    files one by one. Sections lie in the middle of all bodies or, without any, of the domain."""
+    """Draw sections of `scene` into the file `path` and, of one in 3D that has things in it, where vtk is installed, a
+    view beside it; the files one by one. Sections lie in the middle of all bodies or, without any, of the domain."""
     domain = scene.domain
     bodies = scene.solid.bodies if scene.solid else ()
     particles = {body.name: pack(body, domain.lower, domain.upper)[0] for body in bodies}
     regions = [_label(scene, region) for region in _regions(scene)]
     planes = [Plane.across(scene, normal) for normal in {1: (1,), 2: (2,), 3: (2, 1, 0)}[domain.dimensions]]
     yield draw_sections(path, scene.title, [_section(scene, plane, particles) for plane in planes], regions)
-    if domain.dimensions == 3 and find_spec("vtk") is not None:
+    shaped = bodies or any(region.shape for region in _regions(scene))
+    if domain.dimensions == 3 and shaped and find_spec("vtk") is not None:
         spheres = {body.name: (particles[body.name], body.spacing) for body in bodies}
         view = path.with_name(f"{path.stem}-view{path.suffix}")
         yield draw_view(view, (domain.lower, domain.upper), spheres, list(_surfaces(scene)))

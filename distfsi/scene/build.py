@@ -41,6 +41,7 @@ from distfsi.scene.schema import (
     CouplingInput,
     DomainInput,
     FluidInput,
+    InflowStateInput,
     MapInput,
     OutputInput,
     PerformanceInput,
@@ -123,7 +124,9 @@ def _state(given: StateInput, phases: tuple[Phase, ...], dimensions: int) -> Flu
     p = given.pressure
     if p is None:
         p = pressure(phases[index].eos, given.density, present(given.energy))
-    return FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
+    state = FluidState(index, given.density, p, given.velocity or (0.0,) * dimensions, given.volume_fraction)
+    history = given.history if isinstance(given, InflowStateInput) else None
+    return state if history is None else replace(state, history=history.build())
 
 
 def build_solid(given: SolidInput, dimensions: int, highest_pressure: float) -> Solid:

@@ -32,6 +32,7 @@ from distfsi.scene.detonation_checks import check_reactions
 from distfsi.scene.faults import Fault, Path, one_of
 from distfsi.scene.interpenetration import overlap
 from distfsi.scene.law_tables import GaugeInput
+from distfsi.scene.load_checks import check_loads
 from distfsi.scene.packing import pack, uses_rings
 from distfsi.scene.rigid_checks import check_bars, check_rigid, check_ties
 from distfsi.scene.schema import (
@@ -49,6 +50,7 @@ COARSEST_SPACING = 0.75  # of a fluid cell: wider gaps between particles would l
 FILE_NAME = re.compile(r"[\w-]+")
 LONGEST_NAME = 255  # bytes of a file's name
 LONGEST_PATH = 2000  # of the output directory's
+LARGEST_TRACES = 0.5  # of a cell that a pure region may leave to absent phases
 MAXIMUM_CELLS, MAXIMUM_PARTICLES = 1e11, 1e8
 TOUCHING = 1e-3  # of the smaller spacing: bodies that overlap by less touch
 
@@ -80,9 +82,12 @@ def check(
     if solid is not None:
         yield from check_rigid(sections, solid, domain, "fluid" in present)
         yield from check_bars(solid, domain)
+        yield from check_loads(sections, domain, solid, "fluid" in present)
         ties = list(check_ties(solid))
         yield from ties or check_solid(solid, domain, sections.fluid is not None)
-        if fluid is not None:
+        if fluid is not None and len(fluid.phases) > 2:
+            yield Fault(("fluid", "phases"), "beside a solid one or two phases are known, not yet more")
+        elif fluid is not None:
             yield from check_coupling(sections.coupling, solid, domain, fluid)
 
 
@@ -106,6 +111,8 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
     """Regions and the states in them; a method that has its phases."""
     if fluid.sharpening and len(fluid.phases) < 2:
         yield Fault(("fluid", "sharpening"), "needs an interface, so two phases")
+    if len(fluid.phases) > 2:
+        yield from check_many_phases(fluid)
     if not fluid.regions:
         yield Fault(("fluid", "regions"), "is empty; expected an initial state")
     for n, (source, region) in enumerate(zip(given.regions, fluid.regions, strict=True)):
@@ -121,7 +128,27 @@ def check_fluid(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
                 name = f"{AXES[axis]}_{SIDES[side]}"
                 by_energy = getattr(given.inflow, name).energy is not None
                 yield from _check_state(("fluid", "inflow", name), by_energy, state, fluid)
+                yield from _check_history(("fluid", "inflow", name, "history"), state)
     yield from check_reactions(given, fluid)
+
+
+def check_many_phases(fluid: Fluid) -> Iterator[Fault]:
+    """What three and more phases can do, and how they are named in files."""
+    others = len(fluid.phases) - 1
+    if others * fluid.minimum_volume_fraction >= LARGEST_TRACES:
+        text = f"leaves traces of {others} absent phases too much; expected below {LARGEST_TRACES / others:.3g}"
+        yield Fault(("fluid", "minimum_volume_fraction"), text)
+    for name in ("detonation", "afterburn", "map"):
+        if getattr(fluid, name) is not None:
+            yield Fault(("fluid", name), "is known of one or two phases only, not yet of more")
+    for phase in fluid.phases:
+        if not FILE_NAME.fullmatch(phase.name):
+            yield Fault(("fluid", "phases", phase.name), "names a field; expected letters, digits, '_' and '-' only")
+
+
+def _check_history(path: Path, state: FluidState) -> Iterator[Fault]:
+    if state.history is not None and state.pressure + state.history.lowest <= 0.0:
+        yield Fault(path, f"falls by {-state.history.lowest:.3g} Pa, more than the pressure; expected a positive one")
 
 
 def check_rest(level: float, fluid: Fluid, domain: Domain, sources: tuple[Source, ...]) -> Iterator[Fault]:
@@ -147,8 +174,8 @@ def _check_state(path: Path, by_energy: bool, state: FluidState, fluid: Fluid) -
     """A mixture needs two phases within their bounds, a state a real sound speed."""
     if state.volume_fraction is not None:
         limit = fluid.minimum_volume_fraction
-        if len(fluid.phases) < 2:
-            yield Fault((*path, "volume_fraction"), "needs two phases")
+        if len(fluid.phases) != 2:
+            yield Fault((*path, "volume_fraction"), "needs two phases, and no more")
         elif not limit <= state.volume_fraction <= 1.0 - limit:
             yield Fault((*path, "volume_fraction"), f"expected {limit:g} to 1 - {limit:g} (`minimum_volume_fraction`)")
     phase = fluid.phases[state.phase]

@@ -16,7 +16,7 @@ from distfsi.coordinates import Coordinates
 from distfsi.coordinates.planar import PLANAR
 from distfsi.gauges import Gauge
 from distfsi.laws.law import Afterburn as AfterburnLaw
-from distfsi.laws.law import Burn, Failure, FluidEos, SolidEos, Source, Strength
+from distfsi.laws.law import Burn, Failure, FluidEos, PressureHistory, SolidEos, Source, Strength
 from distfsi.scene.bars import Bars
 from distfsi.scene.motion import Free, Motion
 
@@ -125,6 +125,7 @@ class FluidState:
     """State of a phase: density [kg/m3], pressure [Pa], velocity [m/s]; `phase` indexes Fluid.phases.
 
     volume_fraction: of the phase in a mixture with the other one; None: pure, but for the least trace of the other
+    history: of an inflow, the overpressure [Pa] that comes in; None: always the same
     """
 
     phase: int
@@ -132,6 +133,7 @@ class FluidState:
     pressure: float
     velocity: tuple[float, ...]
     volume_fraction: float | None = None
+    history: PressureHistory | None = None
 
 
 @dataclass(frozen=True)
@@ -202,7 +204,7 @@ class Map:
 
 @dataclass(frozen=True)
 class Fluid:
-    """The compressible flow. One phase: Euler; two: `model`.
+    """The compressible flow. One phase: Euler; several: `model`.
 
     hydrostatic_level: coordinate along gravity [m] where the pressure is as the first region says; there, and in all
     regions with that pressure, the fluid is at rest. None: regions have their pressures everywhere.
@@ -342,6 +344,16 @@ class Time:
 
 
 @dataclass(frozen=True)
+class BlastLoad:
+    """The blast of a `mass` [kg] of TNT about a `center` [m] that detonates at `start` [s]."""
+
+    mass: float
+    center: tuple[float, ...]
+    burst: str
+    start: float
+
+
+@dataclass(frozen=True)
 class Peaks:
     """What the cells remember of a blast: overpressure is above `ambient_pressure` [Pa]; a wave has arrived when it
     reaches `arrival_overpressure` [Pa]."""
@@ -415,6 +427,7 @@ class Scene:
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
     coupling: Coupling = Coupling()
     sources: tuple[Source, ...] = ()
+    loads: tuple[BlastLoad, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     stages: tuple[Scene, ...] = ()
     origin: Origin | None = field(default=None, compare=False)

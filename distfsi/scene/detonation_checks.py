@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from distfsi.laws.fluid.ideal_gas import IdealGas
+from distfsi.laws.fluid.noble_abel import NobleAbel
+from distfsi.laws.registry import word_of
 from distfsi.narrowing import present
 from distfsi.scene.description import Detonation, Fluid
 from distfsi.scene.faults import Fault
 from distfsi.scene.schema import FluidInput
 from distfsi.scene.shocks import chapman_jouguet
 
+GASES = (IdealGas, NobleAbel)
 SPEED, PRESSURE = 0.02, 0.05  # parts by which given numbers may differ from what the equation of state gives
 
 
@@ -23,6 +27,11 @@ def check_reactions(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
     if detonation and afterburn and detonation.phase != afterburn.phase:
         name = fluid.phases[detonation.phase].name
         yield Fault(("fluid", "afterburn", "phase"), f"expected that of the detonation, '{name}'")
+    if afterburn and afterburn.law.needs_air:
+        other = fluid.phases[1 - afterburn.phase]
+        if not isinstance(other.eos, GASES):
+            text = f"'{word_of(type(afterburn.law))}' burns with air, but '{other.name}' is no gas"
+            yield Fault(("fluid", "afterburn", "law"), text)
     if detonation is None:
         return
     for n, region in enumerate(given.regions):

@@ -10,10 +10,10 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from distfsi.coordinates import Coordinates
 from distfsi.gauges import Gauge
-from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, SolidEos, Source, Strength
+from distfsi.laws.law import NEEDED, Entry, Failure, FluidEos, Law, PressureHistory, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of, word_of
 from distfsi.narrowing import present
-from distfsi.scene.values import Mirror, quantity, vector
+from distfsi.scene.values import Mirror, quantity, series, vector
 
 LIMITS = {"above": "gt", "at_least": "ge", "below": "lt", "at_most": "le"}  # pydantic's words
 
@@ -41,7 +41,7 @@ def table_of(law: type[Law], key: str | None = None, word: str | None = None) ->
 
 def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
     """Type and description of one key."""
-    whole = given.vector or get_origin(type_) is Literal
+    whole = given.vector or given.series or get_origin(type_) is Literal
     options = {type_} if whole else set(get_args(type_)) - {NoneType} or {type_}
     kind: Any = next(iter(options))
     limits: dict[str, Any] = {LIMITS[name]: limit for name, limit in given.limits.items()}
@@ -50,6 +50,8 @@ def _field(type_: Any, given: Entry) -> tuple[Any, Any]:
         found = table_of(cast(type[Law], kind))
     elif given.vector:
         found = vector(present(given.unit))
+    elif given.series:
+        found = series(present(given.unit))
     elif given.unit is not None:
         found = quantity(given.unit, **limits)
     elif whole:
@@ -74,6 +76,7 @@ PhaseInput = choice(FluidEos, "eos")
 SolidEosInput = choice(SolidEos)
 FailureInput = choice(Failure)
 SourceInput = choice(Source)
+HistoryInput = choice(PressureHistory)
 GaugeInput: Any = choice(Gauge)
 SymmetryWord: Any = Literal[tuple(word_of(kind) for kind in laws_of(Coordinates))]  # a file, a word
 _StrengthTable: Any = choice(Strength)

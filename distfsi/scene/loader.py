@@ -178,6 +178,7 @@ def _assemble(sections: Sections, data: dict[str, Any], stem: str) -> tuple[Scen
         domain=domain,
         time=build.build_time(sections.time),
         sources=build.build_sources(sections.domain.gravity, sections.sources),
+        loads=tuple(load.build() for load in sections.loads.values()),
         fluid=fluid,
         solid=solid,
         output=build.build_output(sections.output, stem, fluid),

@@ -14,7 +14,7 @@ NAMED: dict[Path, str] = {
     ("solid", "rigid"): "rigid body",
     ("solid", "obstacles"): "obstacle",
 }  # tables of names, which an override cannot add to
-TABLES: set[Path] = {*NAMED, ("gauges",), ("sources",)}  # all tables of names
+TABLES: set[Path] = {*NAMED, ("gauges",), ("sources",), ("loads",)}  # all tables of names
 SHOWN = 100  # letters of a setting in a fault
 REMOVED = "none"  # the value that removes a table
 

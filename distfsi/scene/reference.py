@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from typing import Any
 
 from distfsi.gauges import Gauge
-from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, SolidEos, Source, Strength
+from distfsi.laws.law import Afterburn, Burn, Failure, FluidEos, Law, PressureHistory, SolidEos, Source, Strength
 from distfsi.laws.registry import laws_of
 from distfsi.scene.composed_tables import TABLES
 from distfsi.scene.loader import schema
@@ -53,7 +54,8 @@ SECTIONS = {
     "`[fluid.afterburn]`": ("AfterburnSectionInput",),
     "`law` of the afterburn": _names(Afterburn),
     "`[fluid.map]`": ("MapInput",),
-    "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("StateInput",),
+    "`[fluid.inflow.x_low]`, `x_high`, `y_low` ...": ("InflowStateInput",),
+    "`history` of an inflow": _names(PressureHistory),
     "`[solid]`": ("SolidInput",),
     "`[solid.bodies.NAME]`": ("BodyInput",),
     "`[solid.bodies.NAME.bars]`": ("BarsInput",),
@@ -68,6 +70,7 @@ SECTIONS = {
     "Shapes": ("Box", "Ball", "HalfSpace", "Tube", "Cylinder"),
     "Shapes made of others, and from files": tuple(table.__name__ for table in TABLES),
     "`[sources.NAME]`": _names(Source),
+    "`[loads.NAME]`": ("LoadInput",),
     "`[output]`": ("OutputInput",),
     "`[output.peaks]`": ("PeaksInput",),
     "`[gauges.NAME]`": _names(Gauge),
@@ -94,7 +97,22 @@ def markdown() -> str:
 def json_schema() -> str:
     """The JSON schema of the input as text."""
     named = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "distfsi input"}
-    return json.dumps(schema() | named, indent=1, ensure_ascii=False) + "\n"
+    whole = deepcopy(schema())
+    for table in (whole, *whole["$defs"].values()):
+        for node in table.get("properties", {}).values():
+            if "description" not in node:
+                node["description"] = _meaning(node, table, whole["$defs"])
+    return json.dumps(whole | named, indent=1, ensure_ascii=False) + "\n"
+
+
+def _meaning(node: Json, table: Json, definitions: Json) -> str:
+    """What a key without a description of its own means: one that chooses its table, what that is; one that holds a
+    table, what this is."""
+    if "const" in node:
+        return str(table["description"])
+    options = [node, *node.get("anyOf", ())]
+    names = [option["$ref"].rpartition("/")[2] for option in options if "$ref" in option]
+    return str(definitions[names[0]]["description"])
 
 
 def _table(definition: Json) -> Iterator[str]:

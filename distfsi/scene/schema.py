@@ -14,11 +14,13 @@ from distfsi.scene.detonation_tables import AfterburnSectionInput, DetonationInp
 from distfsi.scene.law_tables import (
     FailureInput,
     GaugeInput,
+    HistoryInput,
     SolidEosInput,
     SourceInput,
     StrengthInput,
     SymmetryWord,
 )
+from distfsi.scene.load_tables import LoadInput
 from distfsi.scene.material_tables import NamedPhaseInput, from_material
 from distfsi.scene.mirrors import Shape
 from distfsi.scene.rigid_tables import ObstacleInput, RigidInput
@@ -95,7 +97,7 @@ class StateInput(Table):
     velocity: Velocity | None = Field(None, description="velocity; default at rest")
     volume_fraction: quantity("1", gt=0.0, lt=1.0) | None = Field(
         None,
-        description="of the phase in a mixture with the other; default all but `minimum_volume_fraction`",
+        description="of the phase in a mixture of two; default all but `minimum_volume_fraction` of each other one",
     )
 
     @model_validator(mode="after")
@@ -111,15 +113,25 @@ class RegionInput(StateInput):
     shape: Shape | None = Field(None, description="where; the first region has none and covers everything")
 
 
+class InflowStateInput(StateInput):
+    """State that comes in through an end."""
+
+    history: HistoryInput | None = Field(
+        None,
+        description="overpressure in time; density and velocity are those behind a wave of it that runs into fluid of "
+        "this state; default none",
+    )
+
+
 class InflowInput(Table):
     """State that comes in through each end whose kind is `inflow`."""
 
-    x_low: StateInput | None = None
-    x_high: StateInput | None = None
-    y_low: StateInput | None = None
-    y_high: StateInput | None = None
-    z_low: StateInput | None = None
-    z_high: StateInput | None = None
+    x_low: InflowStateInput | None = None
+    x_high: InflowStateInput | None = None
+    y_low: InflowStateInput | None = None
+    y_high: InflowStateInput | None = None
+    z_low: InflowStateInput | None = None
+    z_high: InflowStateInput | None = None
 
 
 class MapInput(Table):
@@ -132,10 +144,10 @@ class MapInput(Table):
 
 
 class FluidInput(Table):
-    """The compressible flow of one or two phases, numbered in order of appearance."""
+    """The compressible flow of one to five phases, numbered in order of appearance."""
 
     phases: dict[str, NamedPhaseInput] = Field(
-        min_length=1, max_length=2, description="`[fluid.phases.NAME]`: one or two materials, each with its EOS"
+        min_length=1, max_length=5, description="`[fluid.phases.NAME]`: one to five materials, each with its EOS"
     )
     regions: tuple[RegionInput, ...] = Field(description="`[[fluid.regions]]`: the initial state")
     hydrostatic_level: quantity("m") | None = Field(
@@ -148,19 +160,20 @@ class FluidInput(Table):
     reconstruction: description.Reconstruction = Field(
         "minmod", description="slopes of MUSCL, or curves through five cells; volume fractions then by van_leer"
     )
-    sharpening: bool = Field(False, description="of two phases: keep their interfaces within some three cells")
+    sharpening: bool = Field(False, description="of several phases: keep their interfaces within some three cells")
     riemann: description.RiemannSolver = Field(
         "hllc", description='flux; "adaptive": "hllc" with shear along strong shocks, against carbuncles'
     )
     model: description.TwoPhaseModel = Field(
-        "six_equation", description="of two phases: with pressures that relax in each stage, or with one from the start"
+        "six_equation",
+        description="of several phases: with pressures that relax in each stage, or with one from the start",
     )
     detonation: DetonationInput | None = Field(
         None, description="how the explosive burns and what lights it; default: its regions are given burnt"
     )
     afterburn: AfterburnSectionInput | None = Field(None, description="how its products burn with air; default not")
     minimum_volume_fraction: quantity("1", gt=0.0, lt=0.5) = Field(
-        1e-6, description="share of the absent phase in a pure region, and the least of each phase in any cell"
+        1e-6, description="share of each absent phase in a pure region, and the least of each phase in any cell"
     )
     precision: Literal["float64", "float32"] = Field("float64", description="arithmetic")
 
@@ -347,6 +360,7 @@ class Sections(Table):
     charges: tuple[ChargeInput, ...] = Field((), description="`[[charges]]`: explosives by mass and place")
     solid: SolidInput | None = None
     sources: dict[str, SourceInput] = Field({}, description="`[sources.NAME]`: what accelerates everything, besides")
+    loads: dict[str, LoadInput] = Field({}, description="`[loads.NAME]`: what presses on bodies where no fluid is")
     output: OutputInput = OutputInput()
     gauges: dict[str, GaugeInput] = Field({}, description="`[gauges.NAME]`: what is sampled, and how often")
     coupling: CouplingInput = CouplingInput()

@@ -57,6 +57,18 @@ def vector(unit: str) -> Any:
     return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(shown)]
 
 
+def series(unit: str) -> Any:
+    """Type of a list of any number of numbers in `unit`, at least one."""
+
+    def convert(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list) or not value:
+            raise ValueError(f"expected a list of numbers [{unit}]")
+        return tuple(to_si(entry, unit) for entry in value)
+
+    shown = {"type": "array", "items": {"type": ["number", "string"]}, "unit": unit, "minItems": 1}
+    return Annotated[tuple[float, ...], BeforeValidator(convert), WithJsonSchema(shown)]
+
+
 def turn(unit: str) -> Any:
     """Type of what a turn has: in 2D a number in `unit`, in 3D a list of three; in 1D nothing turns."""
 

@@ -34,10 +34,11 @@ class Side(NamedTuple):
 
 
 class Wave(NamedTuple):
-    """A state that forms: velocity and speed of sound [m/s]."""
+    """A state that forms: velocity and speed of sound [m/s], pressure [Pa]."""
 
     velocity: float
     sound: float
+    pressure: float
 
 
 def meet(left: Side, right: Side) -> list[Wave]:
@@ -45,26 +46,26 @@ def meet(left: Side, right: Side) -> list[Wave]:
 
     Between states of tension, and such that leave a vacuum between them, nothing is told.
     """
-    outer = Wave(left.velocity, left.sound), Wave(-right.velocity, right.sound)
+    outer = Wave(left.velocity, left.sound, left.pressure), Wave(-right.velocity, right.sound, right.pressure)
     low, high = LOWEST * min(left.pressure, right.pressure), HIGHEST * max(left.pressure, right.pressure)
     if low <= 0.0:
         return list(outer)
 
     def approach(logarithm: float) -> float:
-        return sum(side.velocity - _behind(side, exp(logarithm))[1] for side in (left, right))
+        return sum(side.velocity - behind(side, exp(logarithm))[1] for side in (left, right))
 
     if approach(log(low)) <= 0.0 or approach(log(high)) >= 0.0:
         return list(outer)
     p = exp(brentq(approach, log(low), log(high), xtol=1e-6))
-    inner = [_behind(side, p) for side in (left, right)]
+    inner = [behind(side, p) for side in (left, right)]
     velocity = left.velocity - inner[0][1]
     between = [
-        Wave(velocity, _sound_speed(side.eos, rho, p)) for side, (rho, _) in zip((left, right), inner, strict=True)
+        Wave(velocity, _sound_speed(side.eos, rho, p), p) for side, (rho, _) in zip((left, right), inner, strict=True)
     ]
     return [outer[0], *between, outer[1]]
 
 
-def _behind(side: Side, p: float) -> tuple[float, float]:
+def behind(side: Side, p: float) -> tuple[float, float]:
     """Density [kg/m3] behind the wave that brings a side to the pressure `p`, and by how much it slows it [m/s]."""
     return _shock(side, p) if p > side.pressure else _rarefaction(side, p)
 

@@ -112,9 +112,9 @@ class BarNetwork:
         force = -self._tie[:, None] * apart
         force[rows, nodes.axis] = -self._slip(apart[rows, nodes.axis])
         self._force += force
-        self._reaction = np.zeros_like(position)
-        shares = nodes.weight[:, :, None] * force[:, None]
-        np.add.at(self._reaction, nodes.around.ravel(), -shares.reshape(-1, force.shape[1]))
+        at, size = nodes.around.ravel(), len(position)
+        shares = [-(nodes.weight * along[:, None]).ravel() for along in force.T]
+        self._reaction = np.stack([np.bincount(at, share, size) for share in shares], axis=1)
         return self._reaction
 
     def _slip(self, slip: np.ndarray) -> np.ndarray:

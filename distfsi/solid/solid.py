@@ -268,6 +268,12 @@ class Solid(Totals):
         self._boundary_impulse += sums[:, 2:]
         return excess
 
+    def bear(self, impulse: Any) -> None:
+        """As apply_impulse(), of a load from outside: impulse and work count as given to the solid."""
+        self.apply_impulse(impulse)
+        self._gravity_work += self.work
+        self._boundary_impulse += self.given.sum(axis=1)
+
     def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
         """See solid/protocol.py: each particle has shared for itself."""
         return impulse, shared

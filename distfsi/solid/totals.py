@@ -90,8 +90,8 @@ class Totals:
         return {f"walls momentum_{axis} [{unit}]": float(m) for axis, m in zip(AXES, given, strict=False)}
 
     def boundary_impulse(self) -> np.ndarray:
-        """Collective. Impulse (D,) [N s] given by symmetry planes, walls, fixed particles and gravity since the start,
-        less the momentum that has left."""
+        """Collective. Impulse (D,) [N s] given by symmetry planes, walls, fixed particles, gravity and loads since the
+        start, less the momentum that has left."""
         return self.blocks.sum(self._boundary_impulse)
 
     def wall_impulse(self) -> np.ndarray:
@@ -102,8 +102,8 @@ class Totals:
         return total.reshape(D, 2, D)
 
     def gravity_work(self) -> float:
-        """Collective. Work [J] of gravity, and of what moves fixed particles, since the start, less the energy that has
-        left."""
+        """Collective. Work [J] of gravity, loads, and what moves fixed particles, since the start, less the energy that
+        has left."""
         return self.blocks.sum(self._gravity_work[:, None])[0]
 
     def workload(self) -> np.ndarray:

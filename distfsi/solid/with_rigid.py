@@ -103,6 +103,8 @@ class SolidWithRigid(Solid):
             for body in self._free.values():
                 body.begin()
         super().prepare(reach, stray, goes_on)
+        if not (self._prescribed or self._free):
+            return
         limits, rows = np.array(self.device.download(self._limits)), self._rigid_rows
         limits[rows] = (SAFETY * c["h"] / c["sound_speed"])[rows, None] if self._meets else math.inf
         self._limits = self.device.array(limits)
@@ -127,6 +129,9 @@ class SolidWithRigid(Solid):
 
     def kick(self, dt: float) -> None:
         """After prepare(). As of any solid; points get the acceleration of their body."""
+        if not self._free:
+            super().kick(dt)
+            return
         c, D = self.columns, self.dimensions
         acceleration, gravity = np.array(self.device.download(self._acceleration)), self._gravity()
         pushes = self._pushes(c["mass"][:, None] * acceleration)
@@ -147,8 +152,10 @@ class SolidWithRigid(Solid):
     def _going(self, dt: float) -> Any:
         """The velocity (own, D) [m/s] with which particles go on for `dt` [s]: of rigid bodies straight to where these
         are then."""
-        c, D = self.columns, self.dimensions
         self._time += dt
+        if not (self._prescribed or self._free):
+            return super()._going(dt)
+        c, D = self.columns, self.dimensions
         going, position = np.array(c["velocity"]), c["position"]
         for b, rows in enumerate(self._rows):
             if b in self._free:
@@ -163,6 +170,8 @@ class SolidWithRigid(Solid):
 
     def _follow(self) -> None:
         """Points of free bodies get their velocities."""
+        if not self._free:
+            return
         c = self.columns
         velocity = np.array(c["velocity"])
         for b, body in self._free.items():
@@ -171,6 +180,8 @@ class SolidWithRigid(Solid):
 
     def share_push(self, mass: Any, gained: Any, impulse: Any, shared: Any) -> tuple[Any, Any]:
         """Collective, after advance(). See solid/protocol.py: bodies share as wholes."""
+        if not self._free:
+            return impulse, shared
         D, download = self.dimensions, self.device.download
         mass, gained, impulse, shared = (np.array(download(array)) for array in (mass, gained, impulse, shared))
         given, added = mass[:, None] * gained[:, :D], mass * gained[:, D]
@@ -187,6 +198,8 @@ class SolidWithRigid(Solid):
 
     def apply_impulse(self, impulse: Any) -> Any:
         """After advance() and before migrate(). As of any solid; points get the velocity that their body gains."""
+        if not self._free:
+            return super().apply_impulse(impulse)
         c, D, device = self.columns, self.dimensions, self.device
         given = device.download(impulse)
         pushes, felt, mass = self._pushes(given), np.array(given), c["mass"][:, None]
@@ -262,7 +275,8 @@ class SolidWithRigid(Solid):
         last step."""
         D, found = self.dimensions, super().reported()
         newton = per_extent("N", D)
-        forces = self.blocks.sum(self.given.reshape(len(self.given), -1)).reshape(self.given.shape[1:])
+        blocks, bodies, axes = self.given.shape
+        forces = self.blocks.sum(self.given.reshape(blocks, bodies * axes)).reshape(bodies, axes)
         forces = forces / self._elapsed if self._elapsed > 0.0 else np.zeros_like(forces)
         for b, body in self._free.items():
             name = self._scene.bodies[b].name

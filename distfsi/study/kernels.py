@@ -140,7 +140,7 @@ def _inventory(scene: Scene, communicator: Communicator) -> Inventory:
         for part in (solid, coupling):
             if part:
                 part.time_step()
-        make_step(fluid, solid, coupling, TimeStep(TIME_STEP, sub_steps=2), simulation.timers)
+        make_step(fluid, solid, coupling, None, TimeStep(TIME_STEP, sub_steps=2), simulation.timers)
         if coupling and scene.coupling.scheme == "cut_cells":
             D = scene.domain.dimensions
             coupling.pressure(TIME_STEP)

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from distfsi.device.cpu import Cpu
+from distfsi.device.gpu import Gpu
+from distfsi.device.host import HostRuntime
 from distfsi.laws.fluid.stiffened_gas import StiffenedGas
+from distfsi.mesh.communicator import Communicator
 from distfsi.scene import description as d
 from distfsi.scene.motion import Support
+from distfsi.simulation import Simulation
 from mpi_coupling import Coupled, among_others, gas, rigid
 
 OPEN = ("outflow", "outflow")
@@ -144,3 +149,17 @@ def test_rigid_bodies_obstacles_and_soft_ones_meet_in_one_scene():
     for a, b in ((0, 1), (1, 2)):  # they have met and not passed through each other
         gaps = np.linalg.norm(x[ids == a][:, None] - x[ids == b], axis=2)
         assert 0.4 * 0.025 < gaps.min() < 2.0 * 0.025
+
+
+@pytest.mark.full
+def test_a_gpu_has_the_bits_of_the_cpu():
+    """Its text, compiled for the host; with bars."""
+    scene, found = among_others(1, 10, "cut_cells")[0].simulation.scene, []
+    for device in (Cpu(1), Gpu(HostRuntime(), True)):
+        simulation = Simulation.of(scene, Communicator(), device=device)
+        for _ in range(4):
+            simulation.step()
+        c = simulation.solid.columns
+        found.append((simulation.fluid.state, c["position"], c["velocity"], simulation.solid.given))
+    for first, second in zip(*found, strict=True):
+        assert np.array_equal(first, second)

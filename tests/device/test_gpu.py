@@ -48,7 +48,7 @@ def test_a_run_leaves_the_files_of_the_cpu(monkeypatch, tmp_path):
     for name in ("cpu", "gpu"):
         given = (*changes, "output.fields_every=3e-7", f'output.directory="{tmp_path / name}"')
         run(load(ROOT / "inputs/steel_tube.toml", given), Communicator(), 1, on_gpu=name == "gpu")
-    own = {"run.json", "performance.csv", "manifest.jsonl"}  # these name the run and its time
+    own = {"run.json", "status.txt", "performance.csv", "manifest.jsonl"}  # these name the run and its time
     files = sorted({path.name for path in (tmp_path / "cpu").glob("*.*") if path.suffix != ".h5"} - own)
     assert "history.csv" in files and "particles-000001.vtkhdf" in files
     assert filecmp.cmpfiles(tmp_path / "cpu", tmp_path / "gpu", files, shallow=False) == (files, [], [])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from distfsi.air_blast import FREE_AIR, SURFACE, air_blast, friedlander, friedlander_decay
+from distfsi.study.air_blast import Blast
 
 # UFC 3-340-02, figures 2-7 and 2-15, as digitised: Z, P_so, P_r [kPa], i_s, i_r [Pa s], t_a, t_0 [ms] of 1 kg
 UFC = {
@@ -118,3 +119,18 @@ def test_the_command_prints_and_draws(tmp_path):
         [sys.executable, "-m", "distfsi", "blast", "--tnt", "5", "--range", "1 km"], capture_output=True, text=True
     )
     assert ended.returncode == 2 and "hold from" in ended.stderr
+
+
+def test_a_gauge_is_read_as_a_blast(tmp_path):
+    """Friedlander's wave with its negative phase: arrival, peak, and the impulse of the positive phase alone."""
+    peak, duration, decay, start = 2e5, 1e-3, 1.7, 5e-4
+    time = np.linspace(0.0, 3e-3, 30001)
+    over = np.where(time > start, [friedlander(peak, duration, decay, t - start) for t in time], 0.0)
+    rows = np.stack([time, over], axis=1)
+    path = tmp_path / "gauge.csv"
+    np.savetxt(path, rows, delimiter=",", header="time [s],overpressure [Pa]", comments="")
+    found = Blast.of(2.0, path)
+    assert found.arrival == pytest.approx(start, rel=1e-3) and found.end == pytest.approx(start + duration, rel=1e-3)
+    assert found.peak == pytest.approx(peak, rel=1e-3)
+    exact = peak * duration * (1.0 / decay - (1.0 - np.exp(-decay)) / decay**2)
+    assert found.impulse == pytest.approx(exact, rel=1e-3)

@@ -7,6 +7,7 @@ import pytest
 from distfsi.diagnostics.budget import Budget
 from distfsi.errors import InputError
 from distfsi.fluid.marching import march
+from distfsi.laws.afterburn.air_limited import AirLimited
 from distfsi.laws.afterburn.miller import Miller
 from distfsi.laws.burn.programmed import Programmed
 from distfsi.mesh.communicator import Communicator
@@ -139,7 +140,12 @@ def test_a_planar_detonation_has_the_speed_of_chapman_and_jouguet(scene, explosi
     expected = np.interp(x / simulation.time, speed, wave, left=wave[0])
     behind = x < burn.speed * simulation.time - 20 * h
     assert np.abs(pressure - expected)[behind].mean() < 0.005 * found.pressure
-    assert 0.88 < pressure.max() / found.pressure < 1.01
+    assert 0.92 < pressure.max() / found.pressure < 1.01
+    # the pressure at the front, to which the wave behind it leads
+    front = burn.speed * simulation.time
+    near = (x < front - 5 * h) & (x > front - 25 * h)
+    leads_to, should = (np.polyval(np.polyfit(x[near] - front, p[near], 2), 0.0) for p in (pressure, expected))
+    assert should == pytest.approx(found.pressure, rel=0.005) and leads_to == pytest.approx(found.pressure, rel=0.03)
     assert primitives(simulation)[5, 0, 0][behind].max() == 0.0  # nothing is left unburnt
 
 
@@ -181,6 +187,15 @@ def test_a_ball_burns_and_burns_on(scene, model):
     assert 0.2 * 10e6 * mass < held[1] < 0.999 * 10e6 * mass  # and some of the products with air
     shares = whole[-2:] / whole[1]
     assert shares.min() >= -1e-9 and shares.max() <= 1.0 + 1e-9
+
+
+def test_products_burn_with_the_air_of_their_cell(scene):
+    """Where all has detonated no air is left over, in the cloud nothing burns, and nothing is created."""
+    law = 'fluid.afterburn.law={kind="air_limited", energy="10.2 MJ/kg", air=3.2}'
+    air, products, *_, unburnt, left = run_of(start(scene(BALL, law)))  # mass and energy to 1e-12
+    mixed, cloud = (products > 0.01) & (unburnt == 0.0), (products > 1.0) & (air < 1e-3)
+    assert np.all(left[mixed] <= np.maximum(products - air / 3.2, 0.0)[mixed] + 1e-9) and mixed.sum() > 100
+    assert np.all(left[cloud] > 0.999 * products[cloud]) and (products - left).max() > 0.1
 
 
 def test_blocks_tiles_and_a_restart_change_no_bit(scene):
@@ -237,24 +252,38 @@ def test_the_burnt_share_follows_time_and_compression():
     assert burn.unburnt(1.0, 1e-7, 1630.0, h) == pytest.approx(1.0 - 0.7 / 1.5, rel=1e-12)
     assert burn.unburnt(0.3, 1e-7, 1630.0, h) == 0.3  # never back
     assert burn.unburnt(1.0, 1e-6, 1630.0, h) == 0.0
-    half = 1630.0 / (1.0 - 0.5 * 21e9 / (1630.0 * 7000.0**2))  # half of the way to V_CJ
-    assert burn.unburnt(1.0, -1.0, half, h) == pytest.approx(0.5, rel=1e-12)
+    dense = 1630.0 / (1.0 - 21e9 / (1630.0 * 7000.0**2))  # at V_CJ
+    assert burn.unburnt(1.0, -1.0, 0.999 * dense, h) == 1.0 and burn.unburnt(1.0, -1.0, 1.001 * dense, h) == 0.0
 
 
 def test_miller_burns_all_and_no_more():
     law = Miller(10e6, 1e4, 0.5, 0.0, 1e5)
     share = 1.0
     for _ in range(10):
-        share = law.left(share, 0.0, 2e6, 1e-5)
+        share = law.left(share, 0.0, 2e6, 0.0, 1e-5)
     assert share == pytest.approx((1.0 - 0.5 * 1e4 * 1e-4) ** 2, rel=1e-12)  # exact in any number of steps
-    assert law.left(share, 0.0, 2e6, 1.0) == 0.0
-    assert law.left(1.0, 0.7, 2e6, 1.0) == 0.7  # only what has detonated
-    assert law.left(0.5, 0.0, 0.9e5, 1.0) == 0.5
+    assert law.left(share, 0.0, 2e6, 0.0, 1.0) == 0.0
+    assert law.left(1.0, 0.7, 2e6, 0.0, 1.0) == 0.7  # only what has detonated
+    assert law.left(0.5, 0.0, 0.9e5, 0.0, 1.0) == 0.5
+
+
+def test_air_limits_the_afterburn():
+    law = AirLimited(10e6, 3.2)
+    assert law.left(1.0, 0.0, 1e6, 0.0, 1.0) == 1.0
+    assert law.left(1.0, 0.0, 1e6, 1.6, 1.0) == 0.5
+    assert law.left(0.3, 0.0, 1e6, 1.6, 1.0) == 0.3  # never back
+    assert law.left(1.0, 0.1, 1e6, 100.0, 1.0) == 1.0  # not before all has detonated
+    assert law.left(1.0, 0.0, 1e6, 100.0, 1.0) == 0.0
 
 
 @pytest.mark.parametrize(
     ("override", "text"),
     [
+        (
+            "fluid.phases.air.material=water\n"
+            'fluid.afterburn={phase="charge", law={kind="air_limited", energy=1, air=3}}',
+            "'air_limited' burns with air, but 'air' is no gas",
+        ),
         ("fluid.detonation.burn.speed=6000", "6000 m/s contradicts the equation of state, which gives 6929.4 m/s"),
         ("fluid.detonation.burn.pressure=15e9", "1.5e+10 Pa contradicts the equation of state, which gives 2.1e+10 Pa"),
         ("fluid.detonation.phase=air", None),
@@ -264,7 +293,7 @@ def test_miller_burns_all_and_no_more():
 )
 def test_what_contradicts_is_a_fault(scene, override, text):
     with pytest.raises(InputError) as caught:
-        scene(PLANAR, override)
+        scene(PLANAR, *override.split("\n"))
     assert text is None or any(text in line for line in caught.value.faults)
 
 

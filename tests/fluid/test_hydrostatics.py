@@ -154,6 +154,33 @@ def test_water_under_air_stays_at_rest(cells, ends):
     assert np.abs(fields(simulation)["pressure"] / before["pressure"] - 1.0).max() < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("cells", "steps", "method"),
+    [
+        ((40,), 300, {}),
+        pytest.param((40,), 10_000, {}, marks=pytest.mark.full),
+        pytest.param((40,), 300, {"model": "five_equation"}, marks=pytest.mark.full),
+        pytest.param((6, 20), 100, {}, marks=pytest.mark.full),
+    ],
+    ids=str,
+)
+def test_a_stack_of_three_materials_stays_at_rest(cells, steps, method):
+    """Products, water and air; the level lies in the second interface, so that all three have the pressure there."""
+    D = len(cells)
+    layers = [(0.25, still(1.6, 1e5, D, 0)), (0.6, still(1000.0, 1e5, D, 1)), (1.0, still(1.2, 1e5, D, 2))]
+    scene = column(
+        (TNT, WATER, AIR), layers, cells, 1.0, 1.0, hydrostatic_level=0.6, reconstruction="van_leer", **method
+    )
+    simulation = start(scene)
+    before = fields(simulation)
+    assert before["pressure"].max() == pytest.approx(1e5 + G * 1000.0 * 0.35, rel=1e-3)
+    for _ in range(steps):
+        simulation.step()
+    after = fields(simulation)
+    assert np.abs(after["velocity"]).max() < 1e-9
+    assert np.abs(after["pressure"] / before["pressure"] - 1.0).max() < 1e-10
+
+
 def test_the_pressure_is_that_of_the_isentrope():
     """p^(1 - 1/gamma) falls linearly: (gamma - 1)/gamma rho0/p0^(1/gamma) g per height."""
     errors = []

@@ -45,6 +45,16 @@ def test_no_bit_depends_on_who_owns_a_block(tmp_path):
     assert results(tmp_path / "shared") == results(tmp_path / "alone")
 
 
+def test_a_rank_without_blocks_says_nothing_wrong(tmp_path):
+    """It tells no work, as numbers of the same type as the others'."""
+    changes = ["time.maximum_steps=101", f"output.directory={tmp_path}"]
+    words = [word for change in changes for word in ("--set", change)]
+    run_ranks(2, ["-m", "distfsi", ROOT / "inputs/sod.toml", "--threads", "1", *words], 120)
+    with (tmp_path / "balance.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert 1.0 <= float(row["busiest rank over mean"]) <= 2.0
+
+
 class Part:
     """All the time goes into the last block."""
 

@@ -212,7 +212,7 @@ def test_a_finished_run_that_goes_on_to_the_same_end_stays(tmp_path):
     before = contents(tmp_path)
     go(tmp_path, GAUGE, restart="auto")
     after = contents(tmp_path)
-    changing = {"run.json", "summary.png", "manifest.jsonl", "performance.csv"}
+    changing = {"run.json", "status.txt", "summary.png", "manifest.jsonl", "performance.csv"}
     assert {n: c for n, c in after.items() if n not in changing} == {
         n: c for n, c in before.items() if n not in changing
     }

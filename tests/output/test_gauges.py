@@ -474,3 +474,17 @@ def test_the_impulse_on_a_body_is_that_of_its_force(tubes):
         force, impulse = gauge[f"force_{axis} [N/m]"], gauge[f"impulse_{axis} [N s/m]"]
         assert impulse[0] == 0.0
         assert np.cumsum(force[1:] * dt) == pytest.approx(impulse[1:], rel=1e-9, abs=1e-9 * np.abs(impulse).max())
+
+
+@pytest.mark.parametrize(("name", "columns"), [("detonation", [0]), ("three_materials", [0, 1, 2])])
+def test_volume_fractions_at_a_point(name, columns):
+    """Those of the cell, also where a phase carries shares behind them, and of three phases that of each."""
+    fluid = Simulation.of(load(ROOT / f"inputs/{name}.toml"), Communicator(), 1).fluid
+    middle = np.array([[fluid.blocks.cell_centers(0)[0][5]]])
+    sampler, cell = FluidSampler(fluid, None, middle), fluid.cells(0)[:, 0, 0, 5]
+    first = list(cell[fluid.model.fraction : fluid.model.fraction + fluid.model.phases - 1])
+    expected = [*first, 1.0 - sum(first)]
+    assert sampler.columns[-len(columns) :] == (
+        ["volume_fraction"] if name == "detonation" else [f"volume_fraction_{m}" for m in ("products", "water", "air")]
+    )
+    assert np.allclose(sampler.values()[0, -len(columns) :], [expected[k] for k in columns], rtol=1e-12)

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +18,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import mpi_output
 from distfsi.coordinates.planar import PLANAR
-from distfsi.output import progress
+from distfsi.output import progress, status
 from distfsi.output.fields import FieldWriter, read_cells, read_particles, series
 from distfsi.output.frames import load_frames
 from distfsi.output.history import History, read_history
@@ -288,6 +289,29 @@ def test_progress_prints_a_line_every_few_seconds(capsys, wall_clock):
     assert first.startswith("step 41  t 41 µs of 1 ms  dt 1 µs (sound in cell (3, 4))  8 steps/s  ETA 1 min 59 s")
     assert second.startswith("step 81  t 81 µs") and second.endswith("drift 1e-15")
     assert last == "done"
+
+
+def test_status_is_in_a_file_while_a_run_goes_on(tmp_path, wall_clock):
+    """Nothing before the run has its directory; compiling and steps every few seconds; the end in any case."""
+    noted = status.Status(tmp_path, OneRank())
+    report = progress.Progress(1e-3, OneRank(), noted)
+    report.compiling(1)
+    assert status.read_status(tmp_path) == {} and not list(tmp_path.iterdir())
+    with suppress(KeyError), noted:
+        assert status.read_status(tmp_path)["status"] == "starting"
+        wall_clock.seconds += 6.0
+        report.compiling(2)
+        assert status.read_status(tmp_path)["status"] == "compiling kernel 2, once for this kind of scene"
+        report.update(1, 1e-6, 1e-6, "start")
+        wall_clock.seconds += 60.0
+        report.update(481, 481e-6, 1e-6, "fluid CFL")
+        lines = status.read_status(tmp_path)
+        assert (lines["status"], lines["step"], lines["time"]) == ("running", "481", "481 µs of 1 ms (48 %)")
+        assert (lines["time step"], lines["left"]) == ("1 µs, limited by fluid CFL", "1 min 04 s")
+        assert lines["memory"].endswith(" MB on rank 0")
+        raise KeyError
+    ended = status.read_status(tmp_path)
+    assert (ended["status"], ended["step"]) == ("failed", "481")
 
 
 def test_progress_is_silent_on_other_ranks(capsys, wall_clock):

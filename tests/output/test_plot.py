@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,7 @@ from distfsi.output.journal import Journal, read_journal
 from distfsi.output.plot import plot
 from distfsi.output.tables import draw_blasts, draw_gauge
 from distfsi.output.timeline import draw_history, verdict
+from distfsi.output.watch import sparkline
 from distfsi.scene import load
 from launch import ROOT
 
@@ -374,3 +376,25 @@ def test_the_journal_notes_how_a_run_ended(tmp_path, error, status, told):
     assert "time in    stage 75 %, output 25 %" in describe(tmp_path)
     if error:
         assert f"because    {notes['message'].splitlines()[0]}" in describe(tmp_path)
+
+
+# ---- watch -----------------------------------------------------------------------------------------------------------
+
+
+def test_watch_says_how_a_run_went(space, capsys):
+    """Off a terminal once: the run's own lines, the budget, and gauges as sparklines."""
+    main(["watch", str(space)])
+    shown = dict(re.split(r"\s{2,}", line, maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert (shown["run"], shown["status"]) == ("A ball of gas and a plate", "done")
+    assert shown["budget"].startswith("3 steps; mass, momentum and energy are conserved")
+    assert re.fullmatch(r"[▁-█]{4} now -?\S+, peak \S+ Pa", shown["gauge point"])
+    with pytest.raises(InputError, match=r"no run has left its run\.json there"):
+        main(["watch", str(space / "gauges")])
+
+
+def test_a_sparkline_keeps_peaks():
+    values = np.zeros(400)
+    values[123] = 8.0
+    assert sparkline(values, 8) == "▁▁█▁▁▁▁▁"
+    assert sparkline(np.linspace(0.0, 7.0, 8)) == "▁▂▃▄▅▆▇█"
+    assert sparkline(np.ones(3)) == "▁▁▁"

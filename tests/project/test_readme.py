@@ -22,9 +22,3 @@ def test_the_input_example_is_valid(tmp_path):
     assert [phase.name for phase in scene.fluid.phases] == ["tnt", "air"]
     assert [body.name for body in scene.solid.bodies] == ["block"]
     assert len(BLOCKS["toml"].splitlines()) <= 25
-
-
-def test_links_lead_to_files():
-    for document in [ROOT / "README.md", ROOT / "launch" / "README.md", *(ROOT / "docs").rglob("*.md")]:
-        for target in re.findall(r"\]\((?!http)([^)#]+)\)", document.read_text()):
-            assert (document.parent / target).exists(), f"{document.name}: {target}"

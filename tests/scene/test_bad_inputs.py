@@ -18,6 +18,8 @@ from launch import ROOT
 
 INPUTS = {path.stem: path.read_text() for path in sorted((ROOT / "inputs").glob("*.toml"))}
 SOD, TUBE, BUBBLE, PLATES = (INPUTS[name] for name in ("sod", "steel_tube", "shock_bubble", "plate_impact"))
+THREE = INPUTS["three_materials"]
+THIRD = "[fluid.phases.third]\neos = 'ideal_gas'\ngamma = 1.4\n"
 
 
 def changed(text, *changes):
@@ -78,7 +80,14 @@ BROKEN = [
     ),
     (changed(SOD, ("shape", "shape = 3")), ["expected a table"]),
     (SOD + "[fluid.phases.second]\n[fluid.phases.third]\n", ["second.eos", "third.eos"]),
-    (SOD + "".join(f"[fluid.phases.{a}]\neos = 'ideal_gas'\ngamma = 1.4\n" for a in "ab"), ["fluid.phases"]),
+    (SOD + "".join(f"[fluid.phases.{a}]\neos = 'ideal_gas'\ngamma = 1.4\n" for a in "abcde"), ["fluid.phases"]),
+    (
+        changed(THREE, ("[fluid]", "[fluid]\nminimum_volume_fraction = 0.3\nmap.run = 'run'")),
+        ["traces of 2 absent phases too much", "is known of one or two phases only"],
+    ),
+    (changed(THREE, ("density", "density = 1630\nvolume_fraction = 0.5")), ["needs two phases, and no more"]),
+    (THREE.replace("phases.air]", "phases.'a/b']").replace('"air"', '"a/b"'), ["names a field"]),
+    (TUBE + THIRD, ["beside a solid one or two phases"]),
     (SOD + "[output]\nfields_every = -1\nhistory_every = 0\n", ["must be >= 0", "must be >= 1"]),
     (SOD + "[performance]\nblock_cells = [2]\ntile_cells = [0]\n", ["must be >= 4", "must be >= 1"]),
     (SOD + "[performance]\nblock_cells = 8\ntile_cells = [4, 4]\n", ["has 2 entries, needs 1"]),

@@ -43,6 +43,7 @@ ADVICE = {  # on purpose
     "cavitation": ("phase 'air' fills no cell",),  # only traces of it, from which the bubbles grow
     "thin_plate": ("thinner than sqrt(2) cells",),
     "concrete_slab": ("2.7 cells per radius",),
+    "undex_plate": ("fewer than 4 particles", "thinner than sqrt(3) cells"),
     "steel_tube_full": ("the rest is hidden", "into body 'tube'"),  # the charge leans against the tube
 }
 
@@ -211,8 +212,10 @@ os.write(1, line.encode())  # at once: ranks share the pipe
 def test_memory_is_that_of_the_run(tmp_path, path, ranks):
     """Within 10 %, kernels compiled before."""
     changes = ["--set", "time.maximum_steps=20", "--set", f"output.directory={tmp_path}"]
-    for _ in range(2):  # the first run compiles, which takes memory of its own
-        told = run_ranks(ranks, ["-c", MEMORY, str(path), "--threads", "1", *changes], 280)
+    command = ["-c", MEMORY, str(path), "--threads", "1", *changes]
+    told = run_ranks(ranks, command, 280)
+    if "compiling kernel" in told:  # which takes memory of its own
+        told = run_ranks(ranks, command, 280)
     peaks = [float(bytes_) for bytes_ in re.findall(r"peak (\d+)", told)]  # not always at the start of a line
     assert len(peaks) == ranks
     assert Resources(load(path), ranks).memory() == pytest.approx(max(peaks), rel=0.1)
@@ -331,6 +334,26 @@ def test_advice_on_what_looks_wrong():
     assert "thinner than sqrt(2) cells" in thin
 
 
+def test_bodies_that_touch_and_do_not_hold_together_are_named(tmp_path):
+    """A stiffener on its plate, unless it is tied to it or flies towards it."""
+    body = """
+[solid.bodies.NAME]
+spacing = 0.05
+material = "steel_4340"
+shape = { kind = "box", lower = LOWER, upper = UPPER }
+"""
+    plate = body.replace("NAME", "plate").replace("LOWER", "[0.1, 0.1]").replace("UPPER", "[0.9, 0.3]")
+    web = body.replace("NAME", "web").replace("LOWER", "[0.4, 0.3]").replace("UPPER", "[0.6, 0.7]")
+    domain = "[domain]\nlower = [0, 0]\nupper = [1, 1]\ncells = [10, 10]\n[time]\nend = 1e-3\n"
+    (tmp_path / "tee.toml").write_text(domain + plate + web)
+    found = [
+        [text for text in advised(load(tmp_path / "tee.toml", changes)) if "hold together" in text]
+        for changes in ((), ('solid.tied=[["plate", "web"]]',), ("solid.bodies.web.velocity=[0.0, -1.0]",))
+    ]
+    assert [len(texts) for texts in found] == [1, 0, 0]
+    assert 'solid.tied = [["plate", "web"]]' in found[0][0]
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "words"),
     [
@@ -338,6 +361,7 @@ def test_advice_on_what_looks_wrong():
         ("sod", ["domain.upper=4", "domain.cells=1600"], "no wave comes nearer to the high x end than 3.06 m"),
         ("sod", ["domain.lower=-3", "domain.cells=1600"], "no wave comes nearer to the low x end than 3.06 m"),
         ("water_air", ["fluid.regions.1.shape.point=2 m"], "phase 'air' fills no cell"),
+        ("water_air", ["fluid.regions.1.density=1.2"], "let go from 1e+09 to 5.41e+05 Pa"),
         (
             "shock_bubble",
             ["fluid.regions.2.shape={kind='half_space', point=[225, 0], normal=[1, 0]}"],

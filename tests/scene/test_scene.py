@@ -295,6 +295,7 @@ def test_all_faults_are_told_at_once_with_line_and_hint(faults):
             "charges",
             "solid",
             "sources",
+            "loads",
             "output",
             "gauges",
             "coupling",

@@ -114,6 +114,73 @@ def test_two_tied_layers_bend_as_the_plate_that_they_make(tmp_path):
     assert np.abs(moved[0] - moved[1]).max() < 1e-12
 
 
+TEE = """
+[domain]
+lower = [-70.0, -10.0, -10.0]
+upper = [70.0, 10.0, 20.0]
+cells = [14, 2, 3]
+[time]
+end = 1e6
+[solid]
+tied = [["flange", "web"]]
+[solid.bodies.flange]
+shape = { kind = "box", lower = [-60.0, -4.0, 0.0], upper = [60.0, 4.0, 2.0] }
+spacing = 1.0
+density = 1.0
+eos = { kind = "linear", bulk_modulus = 0.6667 }
+strength = { kind = "elastic", shear_modulus = 0.4 }
+[solid.bodies.web]
+shape = { kind = "box", lower = [-60.0, -1.0, 2.0], upper = [60.0, 1.0, 8.0] }
+spacing = 1.0
+density = 1.0
+eos = { kind = "linear", bulk_modulus = 0.6667 }
+strength = { kind = "elastic", shear_modulus = 0.4 }
+"""
+
+
+def free_beam(length, area, moment, shear_area, elements=100):
+    """Lowest frequency [rad/s] of a free beam of Young's modulus 1, shear modulus 0.4 and density 1 (Timoshenko), and
+    its deflection at the nodes: linear elements, shear taken at their middles."""
+    h, n = length / elements, 2 * (elements + 1)
+    stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
+    slope, turn = np.array([-1.0, 0.0, 1.0, 0.0]) / h, np.array([0.0, 0.5, 0.0, 0.5])
+    bend = np.array([0.0, -1.0, 0.0, 1.0]) / h
+    shear = slope - turn
+    part = h * (moment * np.outer(bend, bend) + 0.4 * shear_area * np.outer(shear, shear))
+    for k in range(elements):
+        rows = slice(2 * k, 2 * k + 4)
+        stiffness[rows, rows] += part
+        mass[rows, rows] += 0.5 * h * np.diag([area, moment, area, moment])
+    root = 1.0 / np.sqrt(np.diag(mass))
+    squares, modes = np.linalg.eigh(root[:, None] * stiffness * root)
+    return math.sqrt(squares[2]), (root * modes[:, 2])[::2]
+
+
+@pytest.mark.full
+def test_a_stiffener_that_is_tied_to_its_plate_bends_with_it_as_a_tee(tmp_path):
+    """The lowest frequency of a free beam: a quarter of its period, until the velocity with its shape is gone."""
+    (tmp_path / "tee.toml").write_text(TEE)
+    simulation = Simulation.of(load(tmp_path / "tee.toml"), Communicator(), 1)
+    flange, web, middle = 16.0, 12.0, (16.0 * 1.0 + 12.0 * 5.0) / 28.0
+    moment = 8 * 2**3 / 12 + flange * (middle - 1.0) ** 2 + 2 * 6**3 / 12 + web * (5.0 - middle) ** 2
+    rate, shape = free_beam(120.0, 28.0, moment, web)
+    c = simulation.solid.columns
+    x = c["position"][:, 0].copy()
+    along = np.interp(x, np.linspace(-60.0, 60.0, len(shape)), shape)
+    tilt = np.interp(x, np.linspace(-60.0, 60.0, len(shape)), np.gradient(shape, 120.0 / (len(shape) - 1)))
+    size = 1e-4 / np.abs(along).max()
+    c["velocity"][:, 2] = size * along
+    c["velocity"][:, 0] = -size * tilt * (c["position"][:, 2] - middle)
+    c.changed("velocity")
+    times, speeds = [], []
+    while not speeds or speeds[-1] > 0.0:
+        simulation.step()
+        times.append(simulation.time)
+        speeds.append(float((simulation.solid.columns["velocity"][:, 2] * along).sum()))
+    crossing = np.interp(0.0, [-speeds[-2], -speeds[-1]], times[-2:])
+    assert 0.5 * math.pi / crossing == pytest.approx(rate, rel=0.03)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -69,6 +69,17 @@ SINGLE = ("fluid.precision=float32",)
 # All inputs, and runs of choices that no input makes; small where what matters comes late.
 CASES: Mapping[str, Case] = {
     **{path.stem: Case(path.stem) for path in sorted((ROOT / "inputs").glob("*.toml"))},
+    "airblast_far": Case(
+        "airblast_far", settings=("domain.cells=115", "stages.0.domain.cells=130", "stages.0.time.end=20 us")
+    ),
+    "bubble": Case("bubble", settings=("domain.cells=180", "stages.0.domain.cells=120", "stages.0.time.end=50 us")),
+    "undex_sphere": Case(
+        "undex_sphere", settings=("domain.cells=180", "stages.0.domain.cells=90", "stages.0.time.end=50 us")
+    ),
+    "surface_burst": Case("surface_burst", settings=("domain.cells=[40, 30]",)),
+    "wall_blast": Case(
+        "wall_blast", settings=("domain.cells=[20, 12, 12]", "stages.0.domain.cells=100", "stages.0.time.end=40 us")
+    ),
     "sod float32": Case("sod", settings=SINGLE),
     "sedov float32": Case("sedov", settings=SINGLE),
     "tnt_air float32": Case("tnt_air", settings=SINGLE),

@@ -6,6 +6,7 @@ first-order flux between the cells' means, just as far as needed (after Hu, Adam
 It depends on the face's two cells only and is the same for both: conservative, and the same bits on any cut.
 """
 
+from distfsi.fluid.formulas.phases import bounded, fractions
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import (
     DIMENSIONS,
@@ -28,8 +29,11 @@ def partial_masses(W):
     """a_k rho_k of each phase."""
     if PHASES == 1:
         return (W[0],)
-    else:
+    elif PHASES == 2:
         return (W[3 + DIMENSIONS] * W[0], (1.0 - W[3 + DIMENSIONS]) * W[1])
+    else:
+        a = fractions(W)
+        return tuple(a[k] * W[k] for k in static_range(PHASES))
 
 
 def limiter_indicator(left, right, F, c, rate):
@@ -62,6 +66,12 @@ def margins(W, F, rate):
     new = tuple(U[v] - rate * (F[v] - own[v]) for v in static_range(PHASES + DIMENSIONS + 1))
     if PHASES == 1:
         after = primitives(new)
+    elif PHASES > 2:
+        first = PHASES + DIMENSIONS + 1
+        a = bounded(
+            tuple(W[first + k] - rate * (F[first + k] - W[first + k] * F[FLUXES - 1]) for k in static_range(PHASES - 1))
+        )
+        after = primitives((*(new[v] for v in static_range(first)), *(a[k] for k in static_range(PHASES - 1))))
     else:
         a1 = W[3 + DIMENSIONS] - rate * (F[3 + DIMENSIONS] - W[3 + DIMENSIONS] * F[FLUXES - 1])
         a1 = min(max(a1, MINIMUM_FRACTION), 1.0 - MINIMUM_FRACTION)

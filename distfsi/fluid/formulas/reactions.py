@@ -35,7 +35,8 @@ def shares_after(U, since, spacing, dt):
     p, density = W[2 + DIMENSIONS], W[CARRIER]
     shares = tuple(min(max(W[4 + DIMENSIONS + n], 0.0), 1.0) for n in static_range(CARRIED))
     unburnt = unburnt_share(shares[0], since, density, spacing) if BURNS else 0.0
-    left = afterburn_left(shares[CARRIED - 1], unburnt, p, dt) if AFTERBURNS else 0.0
+    air = U[1 - CARRIER] / U[CARRIER] if AFTERBURNS else 0.0
+    left = afterburn_left(shares[CARRIED - 1], unburnt, p, air, dt) if AFTERBURNS else 0.0
     if BURNS and AFTERBURNS:
         return (unburnt, left)
     return (unburnt if BURNS else left,)

@@ -9,6 +9,7 @@ one comes first.
 
 from math import sqrt
 
+from distfsi.fluid.formulas.phases import fractions, in_bounds
 from distfsi.fluid.formulas.relaxation import phases_before, relaxed_fraction_change
 from distfsi.fluid.formulas.riemann import contact_speed
 from distfsi.fluid.formulas.stiffness import held_compression_1, held_compression_2, weight_1, weight_2
@@ -22,6 +23,7 @@ from distfsi.formulas.symbols import (
     FLUXES,
     HELD_ENERGY,
     MINIMUM_FRACTION,
+    PHASES,
     VARIABLES,
     bounding_speeds,
     contact_jump_diffusion,
@@ -125,8 +127,12 @@ def sound_speed(W):
 
 
 def mixture_density(W):
-    """rho = a1 rho1 + a2 rho2 [kg/m3]."""
-    return W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
+    """rho = sum a_k rho_k [kg/m3]."""
+    if PHASES == 2:
+        return W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
+    else:
+        a = fractions(W)
+        return sum(a[k] * W[k] for k in static_range(PHASES))
 
 
 def energy_behind_wave(p, chi, excess, reference_behind, omega):
@@ -177,14 +183,22 @@ def behind_wave(W, s, u_face):
 
 
 def face_flux(left, right, jump):
-    """Fluxes of U (normal momentum first), of both phase energies, and the face velocity (paper, Eqs. 17-27); in the
-    five-equation model without phase energies.
+    """Fluxes of U (normal momentum first), of the phase energies, and the face velocity (paper, Eqs. 17-27); in the
+    five-equation model without phase energies. Of any number of phases.
 
     Everything is smeared alike (fluid/formulas/riemann.py), so that pressure and velocity stay uniform across an
     interface. jump [Pa]: the largest pressure difference along the face.
     """
-    rho_l, u_l, p_l, c_l = mixture_density(left), left[2], left[2 + DIMENSIONS], sound_speed(left)
-    rho_r, u_r, p_r, c_r = mixture_density(right), right[2], right[2 + DIMENSIONS], sound_speed(right)
+    if PHASES > 2:
+        return flux_between(in_bounds(left), in_bounds(right), jump)
+    else:
+        return flux_between(left, right, jump)
+
+
+def flux_between(left, right, jump):
+    """The flux between states whose volume fractions are within their bounds."""
+    rho_l, u_l, p_l, c_l = mixture_density(left), left[PHASES], left[PHASES + DIMENSIONS], sound_speed(left)
+    rho_r, u_r, p_r, c_r = mixture_density(right), right[PHASES], right[PHASES + DIMENSIONS], sound_speed(right)
     s_l, s_r = bounding_speeds(rho_l, u_l, c_l, rho_r, u_r, c_r)
     s_star = contact_speed(rho_l, u_l, p_l, s_l, rho_r, u_r, p_r, s_r)
 
@@ -194,7 +208,7 @@ def face_flux(left, right, jump):
     rho = rho_l if from_left else rho_r
     s, s_there = s_l if from_left else s_r, s_r if from_left else s_l
     subsonic = s_l < 0.0 if from_left else s_r > 0.0
-    u, p = W[2], W[2 + DIMENSIONS]
+    u, p = W[PHASES], W[PHASES + DIMENSIONS]
     u_face = s_star if subsonic else u
     p_face = p + rho * (s - u) * (u_face - u)
     U, U_there = state_behind_wave(W, s, u_face), state_behind_wave(there, s_there, s_star)
@@ -204,30 +218,29 @@ def face_flux(left, right, jump):
     bulk = min(rho_l * (c_l * c_l), rho_r * (c_r * c_r))
     viscosity = slip_viscosity(rho_l * (s_l - u_l), rho_r * (s_r - u_r), jump, bulk)
     F = tuple(U[v] * u_face - kappa * (U_there[v] - U[v]) for v in static_range(FLUXES))
-    slip = tuple(right[2 + d] - left[2 + d] for d in static_range(DIMENSIONS))
-    work = 0.5 * sum(slip[d] * (right[2 + d] + left[2 + d]) for d in static_range(1, DIMENSIONS))
+    slip = tuple(right[PHASES + d] - left[PHASES + d] for d in static_range(DIMENSIONS))
+    work = 0.5 * sum(slip[d] * (right[PHASES + d] + left[PHASES + d]) for d in static_range(1, DIMENSIONS))
     return (
-        F[0],
-        F[1],
-        F[2] + p_face,
-        *(F[2 + d] - viscosity * slip[d] for d in static_range(1, DIMENSIONS)),
-        F[2 + DIMENSIONS] + p_face * u_face - viscosity * work,
-        *(F[v] for v in static_range(3 + DIMENSIONS, FLUXES)),
+        *(F[k] for k in static_range(PHASES)),
+        F[PHASES] + p_face,
+        *(F[PHASES + d] - viscosity * slip[d] for d in static_range(1, DIMENSIONS)),
+        F[PHASES + DIMENSIONS] + p_face * u_face - viscosity * work,
+        *(F[v] for v in static_range(PHASES + DIMENSIONS + 1, FLUXES)),
     )
 
 
 def updated_conserved(U_n, U, D, b, dt):
     """U_n + b (U - D + dt S - U_n) of masses, momentum and total energy; S is the body force and its work."""
-    rho = U[0] + U[1]
-    work = sum(BODY_FORCE[d] * U[2 + d] for d in static_range(DIMENSIONS))
+    E = PHASES + DIMENSIONS
+    rho = sum(U[k] for k in static_range(PHASES))
+    work = sum(BODY_FORCE[d] * U[PHASES + d] for d in static_range(DIMENSIONS))
     return (
-        U_n[0] + b * (U[0] - D[0] - U_n[0]),
-        U_n[1] + b * (U[1] - D[1] - U_n[1]),
+        *(U_n[k] + b * (U[k] - D[k] - U_n[k]) for k in static_range(PHASES)),
         *(
-            U_n[2 + d] + b * (U[2 + d] - D[2 + d] + dt * (BODY_FORCE[d] * rho) - U_n[2 + d])
+            U_n[PHASES + d] + b * (U[PHASES + d] - D[PHASES + d] + dt * (BODY_FORCE[d] * rho) - U_n[PHASES + d])
             for d in static_range(DIMENSIONS)
         ),
-        U_n[2 + DIMENSIONS] + b * (U[2 + DIMENSIONS] - D[2 + DIMENSIONS] + dt * work - U_n[2 + DIMENSIONS]),
+        U_n[E] + b * (U[E] - D[E] + dt * work - U_n[E]),
     )
 
 

@@ -8,7 +8,7 @@ at its density the phase is as stiff as a stiffened gas with the exponent g + om
 Of ideal, stiffened, Noble-Abel and Noble-Abel stiffened gas P is a constant.
 """
 
-from distfsi.formulas.symbols import grueneisen_1, grueneisen_2
+from distfsi.formulas.symbols import grueneisen_1, grueneisen_2, grueneisen_3, grueneisen_4, grueneisen_5
 
 ROOM = 0.95  # of the compression at which a gas has no room: where it is held
 
@@ -22,6 +22,24 @@ def weight_1(rho):
 def weight_2(rho):
     """g of phase 2."""
     omega, slope = grueneisen_2(rho)
+    return 1.0 + rho * slope / omega
+
+
+def weight_3(rho):
+    """g of phase 3."""
+    omega, slope = grueneisen_3(rho)
+    return 1.0 + rho * slope / omega
+
+
+def weight_4(rho):
+    """g of phase 4."""
+    omega, slope = grueneisen_4(rho)
+    return 1.0 + rho * slope / omega
+
+
+def weight_5(rho):
+    """g of phase 5."""
+    omega, slope = grueneisen_5(rho)
     return 1.0 + rho * slope / omega
 
 

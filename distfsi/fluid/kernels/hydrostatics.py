@@ -1,6 +1,7 @@
 """Ghost cells at the ends of the domain under a body force: their pressure is that of fluid at rest."""
 
 from distfsi.device.markers import driver, helper, load, real, store
+from distfsi.fluid.formulas.six_equation import mixture_density
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import BODY_FORCE, DIMENSIONS, GHOSTS, PHASES, VARIABLES, conserved, primitives
 from distfsi.mesh.kernels.grid import BlockGrid, block_of, block_size, first_value
@@ -18,7 +19,7 @@ def primitives_at(U, at, cells):
 @helper
 def density_of(W):
     """[kg/m3] of a primitive state."""
-    return W[0] if PHASES == 1 else W[3 + DIMENSIONS] * W[0] + (1.0 - W[3 + DIMENSIONS]) * W[1]
+    return W[0] if PHASES == 1 else mixture_density(W)
 
 
 @driver

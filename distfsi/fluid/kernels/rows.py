@@ -4,6 +4,14 @@ These are the loops that must vectorise (`@row`); what P, T and F hold is told i
 """
 
 from distfsi.device.markers import helper, int32, load, row, store
+from distfsi.fluid.formulas.relaxation_many import (
+    changes_between,
+    halved_growths,
+    range_of_growths,
+    range_of_pressure,
+)
+from distfsi.fluid.formulas.six_equation import mixture_density
+from distfsi.fluid.formulas.six_equation_many import fractions_after
 from distfsi.fluid.kernels.records import (
     HIGH,
     LOW,
@@ -77,13 +85,18 @@ def low_increment(v, axis):
 
 
 @helper
+def is_fraction(v):
+    """Whether a variable is a volume fraction."""
+    return v > PHASES + DIMENSIONS and v < 2 * PHASES + DIMENSIONS
+
+
+@helper
 def density_at(P, c, sp):
     """[kg/m3] of the cell P[c]; variables are sp apart."""
     if PHASES == 1:
         return load(P, c)
     else:
-        a1 = load(P, c + (PHASES + DIMENSIONS + 1) * sp)
-        return a1 * load(P, c) + (1.0 - a1) * load(P, c + sp)
+        return mixture_density(tuple(load(P, c + v * sp) for v in static_range(VARIABLES)))
 
 
 @helper
@@ -110,7 +123,7 @@ def increments_row(P, T, p, sp, step, t, st, n, fall):
             if HYDROSTATIC and v == PHASES + DIMENSIONS:
                 low, high = pressure_increments(P, p + i, sp, step, fall)
             else:
-                low, high = sharpened(cells) if SHARPENED and v == PHASES + DIMENSIONS + 1 else reconstructed(cells)
+                low, high = sharpened(cells) if SHARPENED and is_fraction(v) else reconstructed(cells)
             store(T, t + v * st + i, high)
             if ASYMMETRIC and not RADIAL:
                 store(T, t + low_increment(v, 0) * st + i, low)
@@ -126,7 +139,7 @@ def increments_in_r_row(P, T, p, sp, t, st, n):
             cells = tuple(load(P, c + k) for k in static_range(1 - GHOSTS, GHOSTS))
             backward, forward = load(P, nearness + i), load(P, nearness + i + 1)
             along = reconstructed_in_r(cells, backward, forward, load(P, to_low + i))
-            low, high = sharpened(cells) if SHARPENED and v == VARIABLES - 1 else along
+            low, high = sharpened(cells) if SHARPENED and is_fraction(v) else along
             store(T, t + v * st + i, high)
             store(T, t + low_increment(v, 0) * st + i, low)
 
@@ -319,6 +332,23 @@ def update_row(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step: 
     return count
 
 
+@helper
+def bisected_changes(phases):
+    """Changes of the volumes of three or more phases that give them one pressure: its range is halved until it is a
+    point, and for each pressure the growths that lead to it."""
+    low, high = range_of_pressure(phases)
+    shortest, longest = range_of_growths(phases)
+    for _ in range(HALVINGS):
+        y = 0.5 * (low + high)
+        shortest, longest = range_of_growths(phases)
+        for _ in range(HALVINGS):
+            shortest, longest = halved_growths(phases, y, shortest, longest)
+        found = changes_between(phases, shortest, longest)
+        full = sum(found[k] for k in static_range(PHASES)) > 0.0
+        low, high = y if full else low, high if full else y
+    return changes_between(phases, shortest, longest)
+
+
 @row
 def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step: StageStep, n):
     """Relax those of the n cells by bisection that `update_row` has not."""
@@ -333,11 +363,17 @@ def bisect_cells(states: States, P, F, T, cells: Cells, fluxes: CellFluxes, step
             step.b,
             step.dt,
         )
-        low, high = range_of_change(phases)
-        for _ in range(HALVINGS):
-            low, high = halved_range(phases, low, high)
-        fraction = fraction_after(before, moved + 0.5 * (low + high))
-        store(states.after, cells.state + (PHASES + DIMENSIONS + 1) * cells.state_variables + i, fraction)
+        first = cells.state + (PHASES + DIMENSIONS + 1) * cells.state_variables + i
+        if PHASES == 2:
+            low, high = range_of_change(phases)
+            for _ in range(HALVINGS):
+                low, high = halved_range(phases, low, high)
+            store(states.after, first, fraction_after(before, moved + 0.5 * (low + high)))
+        else:
+            changes = bisected_changes(phases)
+            fractions = fractions_after(before, tuple(moved[k] + changes[k] for k in static_range(PHASES - 1)))
+            for k in static_range(PHASES - 1):
+                store(states.after, first + k * cells.state_variables, fractions[k])
         i = next_negative(T, 0, i + 1, n)
 
 

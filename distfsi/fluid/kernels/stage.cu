@@ -100,8 +100,13 @@ template <int SIDE> DEVICE real face_size(Metrics metrics, int nx, int i)
 DEVICE real density_at(const real *P, int c)
 {
     if (PHASES == 1) return P[c];
-    const real a1 = P[(PHASES + DIMENSIONS + 1) * SP + c];
-    return a1 * P[c] + (1 - a1) * P[SP + c];
+    const real *a = P + (PHASES + DIMENSIONS + 1) * SP + c;
+    real filled = a[0], rho = a[0] * P[c];
+    for (int phase = 1; phase < PHASES - 1; phase++) {
+        filled = filled + a[phase * SP];
+        rho = rho + a[phase * SP] * P[phase * SP + c];
+    }
+    return rho + (1 - filled) * P[(PHASES - 1) * SP + c];
 }
 
 // fall[d] = g h of the body force along each axis.
@@ -113,7 +118,7 @@ DEVICE void find_falls(const auto &numbers, real dt, real x, real y, real z, rea
 // Increments of a variable from the low face of a cell to its mean and from there to its high face; `fall`: of find_falls.
 template <int AXIS> DEVICE auto increments(const auto &numbers, const real *P, Metrics metrics, int variable, real fall, int i, int j, int k)
 {
-    const bool sharp = variable == PHASES + DIMENSIONS + 1;
+    const bool sharp = variable > PHASES + DIMENSIONS && variable < 2 * PHASES + DIMENSIONS;
     real values[2 * GHOSTS - 1];
 #pragma unroll
     for (int n = 0; n < 2 * GHOSTS - 1; n++) values[n] = P[variable * SP + cell_along<AXIS>(i, j, k, n + 1 - GHOSTS)];
@@ -230,10 +235,32 @@ template <class... T> DEVICE void advance(const auto &numbers, Tuple<T...> befor
         for (int v = 0; v < VARIABLES; v++) U_new[v * su] = values[v];
         if (values[VARIABLES] >= 0) return;
         const auto start = before_relaxation(numbers, before, now, W, D, b, dt);
-        auto range = range_of_change(numbers, item<0>(start));
+        const auto phases = item<0>(start);
+        real *const fraction = U_new + (PHASES + DIMENSIONS + 1) * su;
+        if constexpr (PHASES == 2) {
+            auto range = range_of_change(numbers, phases);
 #pragma unroll 1
-        for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, item<0>(start), item<0>(range), item<1>(range));
-        U_new[(PHASES + DIMENSIONS + 1) * su] = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+            for (int n = 0; n < HALVINGS; n++) range = halved_range(numbers, phases, item<0>(range), item<1>(range));
+            *fraction = fraction_after(numbers, before, item<1>(start) + HALF * (item<0>(range) + item<1>(range)));
+        } else {
+            // the range of pressures is halved, and for each pressure those of the growths of volumes
+            const auto pressures = range_of_pressure(numbers, phases);
+            real lowest = item<0>(pressures), highest = item<1>(pressures), changes[PHASES], moved[PHASES];
+            set(item<1>(start), moved, 1);
+#pragma unroll 1
+            for (int n = 0; n < HALVINGS; n++) {
+                const real y = HALF * (lowest + highest);
+                auto growths = range_of_growths(numbers, phases);
+#pragma unroll 1
+                for (int m = 0; m < HALVINGS; m++) growths = halved_growths(numbers, phases, y, item<0>(growths), item<1>(growths));
+                set(changes_between(numbers, phases, item<0>(growths), item<1>(growths)), changes, 1);
+                real surplus = changes[0];
+                for (int phase = 1; phase < PHASES; phase++) surplus = surplus + changes[phase];
+                (surplus > 0 ? lowest : highest) = y;
+            }
+            for (int phase = 0; phase < PHASES; phase++) moved[phase] = moved[phase] + changes[phase];
+            set(fractions_after(numbers, before, tuple_of<PHASES>(moved)), fraction, su);
+        }
     }
 }
 

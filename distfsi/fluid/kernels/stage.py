@@ -263,6 +263,11 @@ STAGE_FORMULAS = (
     "range_of_change",
     "halved_range",
     "fraction_after",
+    "range_of_pressure",
+    "range_of_growths",
+    "halved_growths",
+    "changes_between",
+    "fractions_after",
 )
 
 

@@ -24,7 +24,7 @@ class Miller(Afterburn):
     n: float = number("exponent of the pressure", at_least=0.0, default=1.0 / 6.0)
     minimum_pressure: float = quantity("Pa", "pressure below which nothing burns", at_least=0.0, default=1e5)
 
-    def left(self, share, unburnt, pressure, dt):
+    def left(self, share, unburnt, pressure, air, dt):
         # At one pressure s^(1 - m) falls evenly: exact, and never below zero.
         fall = (1.0 - self.m) * self.rate * dt * pow(max(pressure, 0.0) / UNIT, self.n)
         rest = max(pow(max(share, 0.0), 1.0 - self.m) - fall, 0.0)
