@@ -21,7 +21,7 @@ from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
-from distfsi.scene.description import Ball, Body, Box, Domain, Output, Performance, Scene, Solid, Time
+from distfsi.scene.description import Ball, Body, Box, Domain, Output, Packing, Performance, Scene, Solid, Time
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
 from distfsi.study.stability import Map, Stability, corners
@@ -146,7 +146,8 @@ def oblique(form: Form, speed: float, angle: float) -> tuple[int, str]:
     """Two discs, 16 particles across, that meet at a speed [m/s], at an angle [deg] to the line through their
     middles."""
     radius, turn = 0.5e-3, np.radians(angle)
-    spacing, packing = radius / 8.0, "rings" if form["form"] == "total_lagrangian" else "lattice"
+    spacing = radius / 8.0
+    packing: Packing = "rings" if form["form"] == "total_lagrangian" else "lattice"
     bodies = [
         replace(
             plate(name, (0.0, 0.0), (0.0, 0.0), spacing, 0.0),
