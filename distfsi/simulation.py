@@ -17,6 +17,7 @@ from distfsi.device.cpu import Cpu
 from distfsi.device.interface import Device
 from distfsi.device.timers import Timers
 from distfsi.diagnostics.derived import DerivedFields
+from distfsi.diagnostics.front import Front
 from distfsi.diagnostics.gauges import GaugeRecorder
 from distfsi.diagnostics.peaks import Peaks
 from distfsi.diagnostics.schlieren import Schlieren
@@ -71,6 +72,7 @@ class Simulation:
     coupling: Coupling | None
     timers: Timers
     loads: Loads | None = None
+    front: Front | None = None
     watchers: list[Peaks | GaugeRecorder] = field(default_factory=list)
     derived: list[DerivedFields] = field(default_factory=list)
     time: float = 0.0
@@ -109,6 +111,8 @@ class Simulation:
             coupling = coupled(scene, model, fluid, solid, blocks, device.with_own_clock())
         loads = Loads(scene, solid, device) if scene.loads and isinstance(solid, Solid) else None
         simulation = cls(scene, communicator, blocks, fluid, solid, coupling, Timers(device), loads)
+        if fluid and isinstance(scene.time.front, float):
+            simulation.front = Front(fluid, scene.time.front, present(scene.fluid).regions[0].state.pressure)
         if fluid and fluid.mapping:
             simulation.time = fluid.mapping.time
         if scene.output.peaks and fluid:
@@ -142,6 +146,8 @@ class Simulation:
         self.steps += 1
         if made.reason not in self.named:
             self.name_limit()
+        if self.front:
+            self.front.look()
         self.watch()
         minimum = self.scene.coupling.drop_below
         if minimum is not None and not self.alone and isinstance(self.coupling, ReleasesFluid):
@@ -250,7 +256,8 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """What a restart needs besides the parts."""
         names = ("time", "steps", "first_step", "loaded", "alone")
-        return {"values": {name: np.array(getattr(self, name)) for name in names}}
+        arrived = {"arrived": np.array(self.front.arrived)} if self.front else {}
+        return {"values": {name: np.array(getattr(self, name)) for name in names} | arrived}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
@@ -258,11 +265,13 @@ class Simulation:
         self.time, self.steps = float(values["time"]), int(values["steps"])
         self.first_step = float(values["first_step"])
         self.loaded, self.alone = bool(values["loaded"]), bool(values["alone"])
+        if self.front:
+            self.front.arrived = bool(values["arrived"])
 
     @property
     def done(self) -> bool:
-        limit = self.scene.time.maximum_steps
-        return self.time >= self.scene.time.end or (limit is not None and self.steps >= limit)
+        limit, arrived = self.scene.time.maximum_steps, self.front is not None and self.front.arrived
+        return self.time >= self.scene.time.end or arrived or (limit is not None and self.steps >= limit)
 
     def outputs(self) -> tuple[dict[str, np.ndarray] | None, dict[str, np.ndarray] | None]:
         """Collective. Fields of cells and particles for the output files."""

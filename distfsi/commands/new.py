@@ -41,9 +41,11 @@ def execute(arguments: argparse.Namespace) -> None:
     asks = sys.stdin.isatty() and sys.stdout.isatty() and None in (arguments.tnt, arguments.range)
     if asks:
         _ask(arguments)
-    missing = [f"--{name}: is missing" for name in ("tnt", "range") if getattr(arguments, name) is None]
-    if missing:
-        raise InputError(missing)
+    faults = [f"--{name}: is missing" for name in ("tnt", "range") if getattr(arguments, name) is None]
+    if arguments.cells and not arguments.wall:
+        faults.append("--cells: is of a scene with --wall; in free air they follow from the charge")
+    if faults:
+        raise InputError(faults)
     blast = Blast(arguments.tnt, arguments.range, bool(arguments.wall), arguments.cells or Blast.cells)
     path = write_scene(blast, arguments.output or OUTPUT)
     print(f"{path}\n  distfsi check {path}     what it will cost\n  distfsi {path}           runs it")
@@ -59,7 +61,7 @@ def _ask(arguments: argparse.Namespace) -> None:
         ("output", "File to write", Path, str(OUTPUT)),
     ]
     for name, question, kind, usual in questions:
-        while getattr(arguments, name) is None:
+        while getattr(arguments, name) is None and not (name == "cells" and not arguments.wall):
             answer = input(f"{question} [{usual}]: ").strip() or usual
             try:
                 setattr(arguments, name, kind(answer))

@@ -28,7 +28,8 @@ LEFT = 0.9  # room for the labels of an axis
 GAP, TITLE, XLABEL = 0.35, 0.4, 0.6  # between panels, above them, below the last of them
 EXPONENT = 0.2  # above a panel, for the power of ten of its axis
 PROFILE_HEIGHT = 1.6
-HEAD = 0.4  # room for the title of a sheet
+HEAD, TITLE_SIZE = 0.4, 11  # room for the title of a sheet; its letters [points]
+TITLE_LETTER, REMARK_LETTER = 0.095, 0.08  # width of a letter there
 
 
 # ---- profiles: runs along x ------------------------------------------------------------------------------------------
@@ -120,10 +121,9 @@ def headed(width: float, heights: Sequence[float], left: str, right: str = "") -
     grid = figure.subfigures(1 + len(heights), 1, squeeze=False, height_ratios=[HEAD, *heights], hspace=0.0)
     head, *parts = grid.ravel()
     inset = 0.2 / width
-    letters = int(9.0 * width) - len(right)
-    head.text(
-        inset, 0.5, shorten(left, max(letters, 20), placeholder=" ..."), va="center", weight="bold", fontsize="large"
-    )
+    letters = int((width - 0.6 - REMARK_LETTER * len(right)) / TITLE_LETTER)
+    title = shorten(left, max(letters, 20), placeholder=" ...")
+    head.text(inset, 0.5, title, va="center", weight="bold", fontsize=TITLE_SIZE)
     head.text(1.0 - inset, 0.5, right, va="center", ha="right", color="0.35")
     return figure, parts
 

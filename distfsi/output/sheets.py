@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from distfsi.output.frames import Film
 from distfsi.output.history import read_history
@@ -69,6 +70,7 @@ def draw_fragments(mass: np.ndarray, speed: np.ndarray, size: np.ndarray, per: s
         heavier, sizes, speeds = grid_of_panels(body, 1, 3, (0.9, 0.3, 0.6, 0.3), (0.9, 0.0))[0]
         heavier.step(np.sort(mass)[::-1], np.arange(1, len(mass) + 1), where="post")
         heavier.set(xscale="log", xlabel=f"mass [kg{per}]", ylabel="fragments at least as heavy")
+        heavier.xaxis.set_minor_formatter(NullFormatter())
         length, metres = scaled("m", largest([size]))
         sizes.hist(size / length, BINS)
         sizes.set(xlabel=f"size [{metres}]", ylabel="fragments")

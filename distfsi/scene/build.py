@@ -69,7 +69,8 @@ def build_domain(given: DomainInput) -> Domain:
 
 def build_time(given: TimeInput) -> Time:
     """End and step size."""
-    return Time(given.end, given.cfl, given.maximum_steps, given.wall_clock_limit, given.scheme, given.smallest_step)
+    limits = given.maximum_steps, given.wall_clock_limit
+    return Time(given.end, given.cfl, *limits, given.scheme, given.smallest_step, given.front)
 
 
 def build_fluid(given: FluidInput, dimensions: int) -> Fluid:

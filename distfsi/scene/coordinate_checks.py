@@ -24,6 +24,8 @@ def check_coordinates(sections: Sections, domain: Domain, fluid: Fluid | None, s
         yield Fault(path, text)
         return
     yield from _check_axis(domain)
+    if sections.time is not None and sections.time.front is not None:
+        yield from _check_front(sections.time.front, domain, fluid)
     if fluid is not None and fluid.map is not None and coordinates.radial and fluid.map.center[0] != 0.0:
         yield Fault(("fluid", "map", "center"), "lies beside the axis of this scene; expected r = 0")
     if not coordinates.radial:
@@ -58,6 +60,15 @@ def _check_axis(domain: Domain) -> Iterator[Fault]:
         yield Fault(("domain", "lower"), f"{domain.lower[0]:g} m along r; expected at least 0")
     if domain.cells[0] < FEWEST_CELLS:
         yield Fault(("domain", "cells"), f"expected at least {FEWEST_CELLS} along r")
+
+
+def _check_front(front: float | str, domain: Domain, fluid: Fluid | None) -> Iterator[Fault]:
+    """A wave comes to one distance in one radial dimension, inside the domain."""
+    path = ("time", "front")
+    if fluid is None or not domain.coordinates.radial or domain.dimensions != 1:
+        yield Fault(path, "is for a fluid in 'spherical' or 'cylindrical' coordinates")
+    elif isinstance(front, float) and not domain.lower[0] < front < domain.upper[0]:
+        yield Fault(path, f"{front:g} m lies outside the domain")
 
 
 def check_map_is_there(scene: Scene) -> Iterator[Fault]:

@@ -329,7 +329,8 @@ class Domain:
 
 @dataclass(frozen=True)
 class Time:
-    """The run ends at `end` [s] or after `maximum_steps`. CFL = dt max sum_d (|u_d| + c)/h_d.
+    """The run ends at `end` [s] or after `maximum_steps`, or when a wave has come as far as `front` [m], or to the
+    first contact in the run that follows. CFL = dt max sum_d (|u_d| + c)/h_d.
 
     `scheme`: a strong-stability-preserving Runge-Kutta method. It stops early, with a restart file, after
     `wall_clock_limit` [s] of computing; and where the stable step is below `smallest_step` of the first one.
@@ -341,6 +342,7 @@ class Time:
     wall_clock_limit: float | None = None
     scheme: Scheme = "rk3"
     smallest_step: float = 1e-3
+    front: float | Literal["contact"] | None = None
 
 
 @dataclass(frozen=True)

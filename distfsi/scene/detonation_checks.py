@@ -28,10 +28,10 @@ def check_reactions(given: FluidInput, fluid: Fluid) -> Iterator[Fault]:
         name = fluid.phases[detonation.phase].name
         yield Fault(("fluid", "afterburn", "phase"), f"expected that of the detonation, '{name}'")
     if afterburn and afterburn.law.needs_air:
-        other = fluid.phases[1 - afterburn.phase]
-        if not isinstance(other.eos, GASES):
-            text = f"'{word_of(type(afterburn.law))}' burns with air, but '{other.name}' is no gas"
-            yield Fault(("fluid", "afterburn", "law"), text)
+        for number, other in enumerate(fluid.phases):
+            if number != afterburn.phase and not isinstance(other.eos, GASES):
+                text = f"'{word_of(type(afterburn.law))}' burns with air, but '{other.name}' is no gas"
+                yield Fault(("fluid", "afterburn", "law"), text)
     if detonation is None:
         return
     for n, region in enumerate(given.regions):

@@ -18,6 +18,7 @@ from distfsi.scene.coordinate_checks import check_map_is_there
 from distfsi.scene.description import Origin, Scene, Shape
 from distfsi.scene.diagnosis import diagnose
 from distfsi.scene.faults import Fault, Locations, Path
+from distfsi.scene.first_contact import with_fronts
 from distfsi.scene.former import replace_former_words
 from distfsi.scene.overrides import TABLES, apply
 from distfsi.scene.schema import Input, Sections, context_of
@@ -60,6 +61,9 @@ def _scene(file: File, text: str, data: dict[str, Any], overrides: Sequence[str]
         stages += [stage] if stage else []
     if scene is not None and not inputs:  # they will have run
         found += check_map_is_there(scene)
+    if scene is not None and len(stages) == len(inputs):
+        stages, unmet = with_fronts(stages, scene)
+        found += unmet
     faults += uncharged + unnamed + [fault for fault in found if not _inside(fault.path, incomplete)]
     locations = Locations(file.name, text, overridden)
     if faults or scene is None:

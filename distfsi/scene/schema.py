@@ -70,6 +70,11 @@ class TimeInput(Table):
     """How long to run."""
 
     end: quantity("s", gt=0.0) = Field(description="end time")
+    front: quantity("m", gt=0.0) | Literal["contact"] | None = Field(
+        None,
+        description="spherical, cylindrical: the run ends before that when a wave has come so far from r = 0; "
+        '"contact", of a stage: when it is near what the next run has beside the fluid around the centre of its map',
+    )
     cfl: quantity("1", gt=0.0, le=1.0) = Field(0.5, description="dt as a fraction of the largest stable one")
     scheme: description.Scheme = Field("rk3", description="strong-stability-preserving Runge-Kutta method")
     maximum_steps: Count | None = Field(None, description="stop after so many steps")

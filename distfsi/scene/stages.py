@@ -13,6 +13,7 @@ from typing import Any
 from distfsi.scene.faults import Path
 
 OF_SPACE = ("regions", "inflow", "map", "detonation")  # what the fluid of another domain says anew
+OF_RUN = ("maximum_steps", "front")  # what a stage does not take over of when the scene's run ends
 OUTPUT = ("history_every", "hdf5", "restart_every")  # what a stage takes over of where results go
 
 
@@ -52,7 +53,7 @@ def _input(
     output = {key: value for key, value in data.get("output", {}).items() if key in OUTPUT}
     given = {
         "title": f"{data.get('title', '')} (stage {number})".lstrip(),
-        "time": {key: value for key, value in data.get("time", {}).items() if key != "maximum_steps"}
+        "time": {key: value for key, value in data.get("time", {}).items() if key not in OF_RUN}
         | stage.get("time", {}),
         "fluid": fluid,
         "output": output | {"directory": directory},

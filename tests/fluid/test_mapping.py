@@ -314,6 +314,57 @@ def test_faults_of_a_stage_are_told_with_their_keys(tmp_path):
         assert key in told, told
 
 
+POOL = """
+[[stages.regions]]
+phase = "gas"
+density = 1.2
+pressure = 1e5
+[[stages.regions]]
+phase = "gas"
+density = 9
+pressure = 1e5
+shape = { kind = "half_space", point = [0, 0.2], normal = [0, -1] }
+"""
+
+
+def test_a_stage_ends_before_the_first_contact(tmp_path):
+    """The front is two cells away from the nearest of what the next run has, and a restart of the stage stays ended."""
+    path = tmp_path / "scene.toml"
+    text = STAGES.replace("time = { end = 1e-5 }", 'time = { end = 1, front = "contact" }')
+    alone = 'regions = [{ phase = "gas", density = 1.2, pressure = 1e5 }]\n'
+    path.write_text(text.replace(alone, "") + POOL)
+    stage = load(path, [f"output.directory={tmp_path / 'out'}"]).stages[0]
+    assert stage.time.front == pytest.approx(0.2 - 2.0 * 0.35 / 21, rel=1e-12)
+    ended = run(stage, Communicator(), 1)
+    found = fields(ended)["pressure"].ravel()
+    disturbed = np.flatnonzero(np.abs(found / 1e5 - 1.0) > 1e-3)[-1]
+    assert (disturbed + 0.5) * 0.005 == pytest.approx(stage.time.front, abs=0.01) and ended.time < 1e-4
+    again = Simulation.of(stage, Communicator(), 1)
+    assert not again.done
+    again.restore(ended.snapshot())
+    assert again.done
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["time.front=0.1"], "time.front.*is for a fluid in 'spherical' or 'cylindrical' coordinates"),
+        (["stages.0.time.front=0.5"], "stages.0.time.front.*0.5 m lies outside the domain"),
+        (["stages.0.time.front=contact"], "stages.0.time.front.*nothing is met; expected it in the stage"),
+        (
+            ["stages.0.time.front=contact", "stages.1.domain.y=['symmetry', 'wall']"],
+            "the first contact is 0.3167 m from",
+        ),
+        (["stages.1.time.front=contact"], "stages.1.time.front.*is for a fluid in"),
+    ],
+)
+def test_fronts_that_nothing_comes_to_are_faults(tmp_path, words, told):
+    path = tmp_path / "scene.toml"
+    path.write_text(STAGES)
+    with pytest.raises(InputError, match=told):
+        load(path, words)
+
+
 BURNING = """
 [domain]
 symmetry = "axisymmetric"

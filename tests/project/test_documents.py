@@ -103,6 +103,11 @@ def test_every_page_is_reached_from_the_readme():
     assert {str(page.relative_to(ROOT)) for page in PAGES if page not in reached} == set()
 
 
+def test_the_schema_for_editors_is_up_to_date():
+    """`distfsi schema > docs/distfsi.schema.json`"""
+    assert (ROOT / "docs" / "distfsi.schema.json").read_text() == json_schema()
+
+
 def test_every_key_of_the_schema_says_what_it_is():
     schema = json.loads(json_schema())
     tables = {"Input": schema, **schema["$defs"]}

@@ -9,9 +9,12 @@ from distfsi.air_blast import FREE_AIR, SURFACE, air_blast
 from distfsi.commands import new
 from distfsi.commands.line import main
 from distfsi.errors import InputError
-from distfsi.report.results import burst_of
+from distfsi.execution import run
+from distfsi.mesh.communicator import Communicator
+from distfsi.report.results import blasts, burst_of
 from distfsi.resources.new_scene import Blast
 from distfsi.resources.report import report
+from distfsi.results import Results
 from distfsi.scene import load
 from distfsi.scene.placed_charges import charges
 from distfsi.scene.warnings import warnings
@@ -65,6 +68,7 @@ def test_the_command_writes_a_new_file_and_no_other(tmp_path, capsys):
     for wrong, fault in (
         (words, "wall.toml: is there already"),
         (["new", "--tnt", "5 kg"], "--range: is missing"),
+        (["new", "--tnt", "5 kg", "--range", "3 m", "--cells", "9"], "--cells: is of a scene with --wall"),
         (["new", "--tnt", "5 kg", "--range", "1 km", "-o", f"{tmp_path}/x"], "--range 1000 m: scaled distance 584.8"),
         (["new", "--tnt", "5 kg", "--range", "10 cm", "-o", f"{tmp_path}/x"], "--range 0.1 m: "),
     ):
@@ -75,13 +79,14 @@ def test_the_command_writes_a_new_file_and_no_other(tmp_path, capsys):
 
 def test_on_a_terminal_it_asks(tmp_path, monkeypatch, capsys):
     """Wrong answers are asked again, no answer means what stands in brackets, and flags are not asked for."""
-    answers = iter(["five", "5 kg", "", "perhaps", "no", "", str(tmp_path / "asked.toml")])
+    answers = iter(["five", "5 kg", "", "perhaps", "yes", "20", str(tmp_path / "asked.toml")])
     questions = []
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     monkeypatch.setattr("builtins.input", lambda question: (questions.append(question), next(answers))[1])
     main(["new"])
-    assert load(tmp_path / "asked.toml").title == "5 kg of TNT, 3 m away"
+    scene = load(tmp_path / "asked.toml")
+    assert (scene.title, scene.domain.cells[0]) == ("5 kg of TNT on the ground, 3 m before a wall", 20)
     assert [question.split(" [")[0] for question in questions] == [
         *["Mass of TNT"] * 2,
         "Distance from the charge",
@@ -90,3 +95,16 @@ def test_on_a_terminal_it_asks(tmp_path, monkeypatch, capsys):
         "File to write",
     ]
     assert next(answers, None) is None and new.OUTPUT.name == "blast.toml"
+
+
+@pytest.mark.full
+def test_the_foot_of_the_wall_gets_the_impulse_of_the_curves(written, tmp_path, monkeypatch):
+    """Coarse cells have the impulse of UFC 3-340-02 within 15 %, and of the peak what finer ones approach."""
+    monkeypatch.chdir(tmp_path)
+    run(written(Blast(5.0, 3.0, wall=True, cells=30)), Communicator())
+    (found,) = blasts(Results("out/blast"))
+    peak, arrival, impulse = found.expected
+    assert found.kind == "reflected, hemisphere on the ground"
+    assert found.impulse == pytest.approx(impulse, rel=0.15)
+    assert found.arrival == pytest.approx(arrival, rel=0.15)
+    assert 0.4 * peak < found.peak < peak

@@ -15,7 +15,8 @@ from distfsi.fluid.formulas.relaxation import DEEPEST, NEAREST, REFITS, SETTLED,
 from distfsi.formulas.subset import static_range
 from distfsi.formulas.symbols import CLOSED_FORM, MINIMUM_FRACTION, PHASES
 
-STEPS = 6  # of Newton: enough for pressures that differ by a factor of 3; what is left goes on with bisection
+STEPS = 6  # of Newton: enough for pressures that differ by a factor of 1.3; what is left goes on with bisection
+REFIT_STEPS = 2  # of Newton, with the hyperbolas fitted anew
 CLOSE = 1e-7  # of p + P of the softest phase: Newton's last step, whose error is about its square
 
 
@@ -74,18 +75,35 @@ def lower_bound(k, q, c):
     return max(lowest, highest_of(tuple(k[n] / total * (q[n] + c[n]) - c[n] for n in static_range(PHASES))))
 
 
-def changes_of_fit(k, q, c, too_much):
-    """Changes of the volumes that give all phases one pressure when each grows by k (q - y)/(c + y), and together
-    shrink by what they have `too_much`; Newton's last step over the c + y of the softest phase."""
-    y, step = lower_bound(k, q, c), 0.0
-    for _ in static_range(STEPS):
-        part = tuple(1.0 / (c[n] + y) for n in static_range(PHASES))
-        surplus = too_much + sum(k[n] * ((q[n] - y) * part[n]) for n in static_range(PHASES))
-        slope = sum(k[n] * ((q[n] + c[n]) * (part[n] * part[n])) for n in static_range(PHASES))
-        step = surplus / slope
-        y = y + step
+def newton_step(k, q, c, too_much, y):
+    """The next pressure y, and the step to it, at which volumes that grow by k (q - y)/(c + y) shrink together by what
+    they have `too_much`."""
+    part = tuple(1.0 / (c[n] + y) for n in static_range(PHASES))
+    surplus = too_much + sum(k[n] * ((q[n] - y) * part[n]) for n in static_range(PHASES))
+    slope = sum(k[n] * ((q[n] + c[n]) * (part[n] * part[n])) for n in static_range(PHASES))
+    return (y + surplus / slope, surplus / slope)
+
+
+def changes_at(k, q, c, y, step):
+    """Changes of the volumes at the pressure y; Newton's last step over the c + y of the softest phase."""
     softest = lowest_of(tuple(c[n] + y for n in static_range(PHASES)))
     return (tuple(k[n] * ((q[n] - y) / (c[n] + y)) for n in static_range(PHASES)), abs(step) / softest)
+
+
+def changes_of_fit(k, q, c):
+    """Changes of the volumes that give all phases one pressure when each grows by k (q - y)/(c + y)."""
+    y, step = lower_bound(k, q, c), 0.0
+    for _ in static_range(STEPS):
+        y, step = newton_step(k, q, c, 0.0, y)
+    return changes_at(k, q, c, y, step)
+
+
+def changes_of_refit(k, q, c, too_much):
+    """The same where the pressures are near each other already."""
+    y, step = lower_bound(k, q, c), 0.0
+    for _ in static_range(REFIT_STEPS):
+        y, step = newton_step(k, q, c, too_much, y)
+    return changes_at(k, q, c, y, step)
 
 
 def pressures_after(phases, growth):
@@ -122,7 +140,7 @@ def relaxed_changes(phases):
     """Changes of all volumes by relaxation, and a value that is negative where they have not settled."""
     p_n, a, rho, G, q, c = phases
     exponent = exponents(rho)
-    changes, left = changes_of_fit(tuple(a[k] * (1.0 / exponent[k]) for k in static_range(PHASES)), q, c, 0.0)
+    changes, left = changes_of_fit(tuple(a[k] * (1.0 / exponent[k]) for k in static_range(PHASES)), q, c)
     if CLOSED_FORM:
         return (changes, settled_by(left, CLOSE))
     else:
@@ -137,7 +155,7 @@ def relaxed_changes(phases):
             fit = tuple(a[k] * (1.0 + (1.0 + omega_now[k]) * growth[k]) / exponent_now[k] for k in static_range(PHASES))
             stiff = stiffnesses(p_n, now, references(now), exponent_now)
             too_much = sum(a[k] * growth[k] for k in static_range(PHASES))  # where a bound has cut something off
-            further, left = changes_of_fit(fit, pressures_after(phases, growth), stiff, too_much)
+            further, left = changes_of_refit(fit, pressures_after(phases, growth), stiff, too_much)
             growth = tuple(
                 min(max(before[k] + further[k] / a[k], smallest[k]), largest[k]) for k in static_range(PHASES)
             )
