@@ -69,9 +69,7 @@ def _steps(resources: Resources) -> str:
     text = f"about {resources.steps:,}, if no wave becomes faster than the first ones"
     solid = resources.scene.solid
     velocities = {body.velocity for body in solid.bodies} if solid else set()
-    return text + (
-        " and bodies do not meet: the springs between them make steps shorter" if len(velocities) > 1 else ""
-    )
+    return text + (" and bodies do not meet: what they compress makes steps shorter" if len(velocities) > 1 else "")
 
 
 def _blocks(resources: Resources) -> str:

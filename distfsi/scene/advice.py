@@ -146,7 +146,7 @@ def _touching_bodies(scene: Scene) -> Iterator[str]:
 
 
 def _staircases(scene: Scene) -> Iterator[str]:
-    """Balls in lattices that others may meet."""
+    """Each ball in a lattice that others may meet."""
     bodies = _bodies(scene)
     for body in bodies if len(bodies) > 1 and scene.domain.dimensions == 3 else ():
         if isinstance(body.shape, Ball) and not (body.packing or body.motion):

@@ -216,8 +216,8 @@ class BodyInput(Table):
     packing: description.Packing | None = Field(
         None,
         description="lattice; rings along the surface of a tube, ball or cylinder, those of a ball in 3D in shells; or "
-        "relaxed: particles that pushed each other apart; default rings in cylinders, in 2D tubes and, if bonds hold "
-        "them, balls, relaxed in what no lattice fits, else lattice",
+        "relaxed: particles that pushed each other apart; default rings in a cylinder, in 2D in a tube and, if bonds "
+        "hold it, in a ball; relaxed in what no lattice fits, else lattice",
     )
     lattice_angle: quantity("rad") = Field(
         0.0, description="turns the lattice about the axis of a cylinder, else about z; 2D and 3D"

@@ -1,12 +1,13 @@
 """Where each form of the solid survives: tension, impact, thin plates, long time steps; and why it fails where it does.
 
 A run has survived when it reaches its end with a valid state, its energy kept and, where nothing can break, in one
-piece: all bonds whole or, where there are none, no particle out of touch with the others.
+piece: all bonds whole or, where there are none, no particle out of touch with the others. No body is in another one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from distfsi.laws.solid.eos.mie_grueneisen import MieGrueneisen
 from distfsi.laws.solid.strength.johnson_cook import JohnsonCook
 from distfsi.mesh.communicator import Communicator
 from distfsi.narrowing import present
-from distfsi.scene.description import Body, Box, Domain, Output, Performance, Scene, Solid, Time
+from distfsi.scene.description import Ball, Body, Box, Domain, Output, Packing, Performance, Scene, Solid, Time
 from distfsi.simulation import Simulation
 from distfsi.study.solids import energy
 from distfsi.study.stability import Map, Stability, corners
@@ -35,14 +36,16 @@ FORMS: dict[str, Form] = {
     "updated Lagrangian": {"form": "updated_lagrangian"},
     "updated, artificial stress": {"form": "updated_lagrangian", "artificial_stress": 0.3},
 }
-SURVIVED, BROKEN, LEAKED, FAILED = range(4)
+SURVIVED, BROKEN, LEAKED, FAILED, PASSED = range(5)
 VERDICTS = {
     "survived": "tab:green",
     "broke without a reason": "tab:orange",
     "lost its energy": "tab:olive",
     "failed": "tab:red",
+    "got into each other": "tab:purple",
 }
 APART = 1.6  # of the spacing, stretched as the body is: farther from all others means broken off
+CLOSEST = 0.25  # spacings between particles of bodies that are not in each other, compressed as they may be
 SHRINKS = 30.0  # times, the stable step until a run has failed
 FACTORS = (0.1, 0.2, 0.33, 0.5, 0.67, 0.83, 1.0)  # of the stable step, over 0.3
 
@@ -139,6 +142,47 @@ def impact(form: Form, speed: float, factor: float, through: float = 8.0) -> tup
     return advance(simulation, 2.0 * thick / 4000.0, factor)
 
 
+def oblique(form: Form, speed: float, angle: float) -> tuple[int, str]:
+    """Two discs, 16 particles across, that meet at a speed [m/s], at an angle [deg] to the line through their
+    middles."""
+    radius, turn = 0.5e-3, np.radians(angle)
+    spacing = radius / 8.0
+    packing: Packing = "rings" if form["form"] == "total_lagrangian" else "lattice"
+    bodies = [
+        replace(
+            plate(name, (0.0, 0.0), (0.0, 0.0), spacing, 0.0),
+            shape=Ball((-sign * radius, 0.0), radius),
+            velocity=(0.5 * sign * speed * np.cos(turn), 0.5 * sign * speed * np.sin(turn)),
+            packing=packing,
+        )
+        for name, sign in (("left", 1.0), ("right", -1.0))
+    ]
+    return meeting(form, bodies, 4.0 * radius / 4000.0)
+
+
+def unlike(form: Form, speed: float, ratio: float) -> tuple[int, str]:
+    """Two plates that meet at a speed [m/s], the particles of one being closer by a ratio."""
+    thick, wide, spacing = 1e-3, 1e-3, 1.25e-4
+    bodies = [
+        plate("left", (-thick, -0.5 * wide), (0.0, 0.5 * wide), spacing, 0.5 * speed),
+        plate("right", (0.0, -0.5 * wide), (thick, 0.5 * wide), spacing / ratio, -0.5 * speed),
+    ]
+    return meeting(form, bodies, 2.0 * thick / 4000.0)
+
+
+def meeting(form: Form, bodies: Sequence[Body], end: float) -> tuple[int, str]:
+    """Two bodies until `end` [s], which must not get into each other."""
+    simulation = Simulation.of(scene_of(form, bodies, 1e-2), Communicator(), 1)
+    verdict, why = advance(simulation, end)
+    if verdict != SURVIVED:
+        return verdict, why
+    c = present(simulation.solid).columns
+    first, second = (c["position"][c["body"] == b] for b in (0, 1))
+    near, _ = cKDTree(first).query(second)
+    closest = near.min() / min(body.spacing for body in bodies)
+    return (SURVIVED, "") if closest > CLOSEST else (PASSED, f"particles {closest:.2g} spacings from each other")
+
+
 def thin(form: Form, speed: float, through: float) -> tuple[int, str]:
     """The same of plates that are so many particles thick."""
     return impact(form, speed, 1.0, through)
@@ -172,6 +216,24 @@ MAPS = (
         "particles across",
         (1.0, 2.0, 4.0, 8.0),
         thin,
+    ),
+    Map(
+        "angle",
+        "Copper discs meet",
+        "speed [m/s]",
+        SPEEDS,
+        "angle to the line through their middles [deg]",
+        (0.0, 20.0, 40.0, 60.0),
+        oblique,
+    ),
+    Map(
+        "ratio",
+        "Copper plates of unlike particles meet",
+        "speed [m/s]",
+        SPEEDS,
+        "ratio of the spacings",
+        (1.0, 2.0, 4.0),
+        unlike,
     ),
 )
 

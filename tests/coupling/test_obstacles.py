@@ -159,9 +159,8 @@ motion = { times = [0.0, 10.0], displacements = [0.0, 5.0] }
     assert np.mean(forces) == pytest.approx(back - front, rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    "text", [CHARGE + BLOCK, pytest.param(rotor(3.0, 2.0), marks=pytest.mark.full)], ids=["stands", "moves"]
-)
+@pytest.mark.full
+@pytest.mark.parametrize("text", [CHARGE + BLOCK, rotor(3.0, 2.0)], ids=["stands", "moves"])
 def test_a_gpu_has_the_bits_of_the_cpu(tmp_path, text):
     """Its text, compiled for the host."""
     (tmp_path / "scene.toml").write_text(SCENE + text)

@@ -317,6 +317,24 @@ def test_a_block_slides_and_sticks_as_coulomb_says(friction, slope, speed):
     assert abs(velocity[1]) < 0.1
 
 
+@pytest.mark.full
+def test_a_disc_that_slides_begins_to_roll():
+    """In rings, 8 particles to its radius: with 2/3 of its speed and the spin of that, which is 8 % too small."""
+    eos, strength, floor = LinearEos(1e6), Elastic(5e5), Box((-0.3, -0.025), (0.3, 0.0))
+    low = replace(body(floor, 0.0125, 1000.0, (0.0, 0.0), eos, strength, floor), name="floor")
+    disc = replace(body(Ball((0.0, 0.1), 0.1), 0.0125, 1000.0, (0.3, 0.0), eos, strength), packing="rings")
+    given = {"form": "total_lagrangian", "sources": (Gravity((0.0, -10.0)),), "friction": 0.3}
+    part, time, found = solid([low, disc], (-0.5, -0.5), (0.5, 0.5), **given), 0.0, []
+    while time < 0.08:  # it slides until 0.033
+        time += step(part)[0]
+        mass, momentum, spin, _ = momenta(part, part.columns["body"] == 1)
+        if time > 0.06:
+            found.append((momentum[0] / mass, -spin / (0.5 * mass * 0.1)))
+    speed, edge = np.mean(found, axis=0)
+    assert speed == pytest.approx(0.2, rel=0.02)
+    assert edge == pytest.approx(0.2, rel=0.1)
+
+
 # ---- walls -----------------------------------------------------------------------------------------------------------
 
 

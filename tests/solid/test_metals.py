@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from distfsi.solid import solid as solid_part
 from distfsi.study import frontier, solids, stability_solid
 
 
@@ -88,3 +89,12 @@ def test_stretched_plates_stay_whole_with_bonds_alone():
     assert stability_solid.stretched(bonds, 0.6, 1.0) == (stability_solid.SURVIVED, "")
     verdict, why = stability_solid.stretched(updated, 0.6, 1.0)
     assert (verdict, why.endswith("pieces")) == (stability_solid.BROKEN, True)
+
+
+@pytest.mark.parametrize("angle", [pytest.param(0.0, marks=pytest.mark.full), 40.0])
+def test_discs_of_copper_at_1_km_s_do_not_get_into_each_other(monkeypatch, angle):
+    """As the study of stability judges; without contact it finds that they do."""
+    bonds = stability_solid.FORMS["total Lagrangian"]
+    assert stability_solid.oblique(bonds, 1000.0, angle) == (stability_solid.SURVIVED, "")
+    monkeypatch.setattr(solid_part, "contacts_of", lambda *_: [])
+    assert stability_solid.oblique(bonds, 1000.0, angle)[0] == stability_solid.PASSED
