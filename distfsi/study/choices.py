@@ -37,7 +37,8 @@ def _values(annotation: Any) -> tuple[Any, ...]:
     if get_origin(annotation) is Literal:
         return get_args(annotation)
     if get_origin(annotation) in (Union, UnionType):
-        return tuple(value for part in get_args(annotation) for value in _values(part))
+        parts = [_values(part) for part in get_args(annotation) if part is not type(None)]
+        return tuple(value for part in parts for value in part) if all(parts) else ()
     return ()
 
 

@@ -103,7 +103,7 @@ pressure = "1 bar"
     assert max(abs(value) for name, value in row.items() if name.startswith("drift")) < 1e-12
     mass = np.pi * 0.4**2 * 1000.0
     assert row["fluid mass_1 [kg]"] == pytest.approx(mass, rel=1e-12)
-    assert row["body force momentum_y [N s]"] == pytest.approx(-G * mass * simulation.time, rel=1e-10)
+    assert row["body force momentum_z [N s]"] == pytest.approx(-G * mass * simulation.time, rel=1e-10)
 
 
 # ---- at rest ---------------------------------------------------------------------------------------------------------

@@ -32,8 +32,6 @@ SOD = (
 LIMITED = """
 import resource, runpy, sys
 from mpi4py import MPI  # starts up with files of its own
-from launch import SUPPORT
-from one_rank import OneRank
 limit = int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 runpy.run_module("distfsi", run_name="__main__")

@@ -48,9 +48,9 @@ EDGES = {
     "a gauge of 300 letters": (SOD + f"[gauges.{'a' * 300}]\nkind = 'point'\nposition = 0.5\n", "300 letters"),
     "a folder of 300 letters": (SOD + f"[output]\ndirectory = 'out/{'a' * 300}'\n", "too long"),
     "10000 wrong regions": (SOD + 10_000 * REGION, "more faults"),
-    "three phases": (
-        SOD + "".join(f"[fluid.phases.{a}]\neos = 'ideal_gas'\ngamma = 1.4\n" for a in "ab"),
-        "fluid.phases: has 3 entries; at most 2",
+    "six phases": (
+        SOD + "".join(f"[fluid.phases.{a}]\neos = 'ideal_gas'\ngamma = 1.4\n" for a in "abcde"),
+        "fluid.phases: has 6 entries; at most 5",
     ),
     "a law in capitals": (TUBE.replace('eos = "jwl"', 'eos = "JWL"'), "did you mean 'jwl'?"),
 }
