@@ -76,6 +76,7 @@ CASES: Mapping[str, Case] = {
     "undex_sphere": Case(
         "undex_sphere", settings=("domain.cells=180", "stages.0.domain.cells=90", "stages.0.time.end=50 us")
     ),
+    "undex_plate": Case("undex_plate", settings=("stages.0.domain.cells=190", "stages.0.time.end=50 us")),
     "surface_burst": Case("surface_burst", settings=("domain.cells=[40, 30]",)),
     "wall_blast": Case(
         "wall_blast", settings=("domain.cells=[20, 12, 12]", "stages.0.domain.cells=100", "stages.0.time.end=40 us")
