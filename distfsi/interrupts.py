@@ -5,6 +5,7 @@ It imports nothing that takes time, so that `distfsi run` listens before all els
 
 from __future__ import annotations
 
+import os
 import signal
 import time as clock
 from collections.abc import Mapping
@@ -31,6 +32,7 @@ class Interrupts:
         """Listen from now on, to the end of the process; the wall-clock limit counts from here."""
         if self.began is None:
             self.began = clock.monotonic()
+            os.environ.setdefault("UCX_DEBUG_SIGNO", "0")  # a library of MPI takes SIGHUP for itself otherwise
             self.listen()
 
     def listen(self) -> Handlers:

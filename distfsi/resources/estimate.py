@@ -26,7 +26,9 @@ from distfsi.simulation import deal_blocks
 
 PROCESS_BYTES = 140e6  # of a rank that has no blocks: Python and its libraries
 KERNEL_BYTES = 102e6  # of numba and compiled kernels: of a fluid where there are blocks, of solids on all ranks
-DRAWING_BYTES, PICTURE_BYTES = 45e6, 25e6  # on the first rank: of matplotlib, of the maps of a fluid in the summary
+DRAWING_BYTES = 45e6  # of matplotlib, on the first rank
+MAP_BYTES, CELLS_OF_MAPS = 65e6, 1e5  # of the maps of a fluid in the summary, and of how many cells they take as much
+CUT_BYTES = 60e6  # of those in three dimensions
 COUPLING_BYTES = 20e6  # of the compiled kernels of a coupling, per dimension
 PARTICLE_BYTES = {  # at the peak, of the start or within a step, by dimensions
     "total_lagrangian": {1: 900.0, 2: 1060.0, 3: 4300.0},
@@ -110,7 +112,9 @@ class Resources:
 
     def memory(self) -> float:
         """Of the rank that takes most, at its peak."""
-        drawing = DRAWING_BYTES + (PICTURE_BYTES if self.scene.fluid and self.dimensions > 1 else 0.0)
+        drawing = DRAWING_BYTES
+        if self.scene.fluid and self.dimensions > 1:
+            drawing += CUT_BYTES if self.dimensions == 3 else MAP_BYTES * min(self.cells / CELLS_OF_MAPS, 1.0)
         kernels = KERNEL_BYTES
         if self.scene.fluid and self.scene.solid:
             kernels += COUPLING_BYTES * self.dimensions

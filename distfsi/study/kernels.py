@@ -124,8 +124,9 @@ class Listening(Cpu):
 
 def inventory(scene: Scene, communicator: Communicator) -> Inventory:
     """The kernels that a scene builds, and those that a step of it calls, whatever comes out of them."""
+    fluid = replace(scene.fluid, map=None) if scene.fluid else None  # the run that is mapped is not there
     with TemporaryDirectory() as directory:  # gauges write what they see
-        return _inventory(replace(scene, output=replace(scene.output, directory=directory)), communicator)
+        return _inventory(replace(scene, fluid=fluid, output=replace(scene.output, directory=directory)), communicator)
 
 
 def _inventory(scene: Scene, communicator: Communicator) -> Inventory:
@@ -216,12 +217,13 @@ def precision(scene: Scene) -> str:
 
 
 def shipped(inputs: Path) -> dict[str, Scene]:
-    """All scenes of a folder, those with a fluid in both precisions."""
+    """All scenes of a folder with their stages, those with a fluid in both precisions."""
     scenes = {}
     for path in sorted(inputs.glob("*.toml")):
         for real in REALS if load(path).fluid else ("",):
             name = " ".join([path.stem, *([real] if real == "float32" else [])])
-            scenes[name] = load(path, (f"fluid.precision={real}",) if real else ())
+            scenes[name] = scene = load(path, (f"fluid.precision={real}",) if real else ())
+            scenes |= {f"{name} stage {number}": stage for number, stage in enumerate(scene.stages, 1)}
     return scenes
 
 
