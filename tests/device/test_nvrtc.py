@@ -13,8 +13,8 @@ from launch import ROOT
 
 FEW = (("one gas", 1, "float32"), ("two gases", 2, "float64"), ("TNT and air", 2, "float32"))
 TOO_LARGE = {"surface_burst", "three_materials", "wall_blast"}
-"""Shipped scenes whose stage in float64 spills, or wants more shared memory than some architectures have: a burning charge
-in (r, z) and in 3D, three materials. That in float32 does not."""
+"""Shipped scenes whose stage in float64 spills, or wants more shared memory than some architectures have: a burning
+charge in (r, z) and in 3D, three materials. That in float32 does not."""
 SHARED = 99 * 1024  # bytes of shared memory of a block that every one of the architectures has
 
 
