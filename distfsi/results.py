@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -72,21 +72,15 @@ class Fields(Mapping[str, np.ndarray]):
     units  of the fields that have one, by name
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, names: Sequence[str], read: Callable[[Path, str], np.ndarray]):
         self.path, self.time = path, read_time(path)
-        self._names = self._find_names()
-        self.units = {name: UNITS[name] for name in self._names if name in UNITS}
-
-    def _find_names(self) -> list[str]:
-        raise NotImplementedError
-
-    def _read(self, name: str) -> np.ndarray:
-        raise NotImplementedError
+        self._names, self._read = names, read
+        self.units = {name: UNITS[name] for name in names if name in UNITS}
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._names:
             raise KeyError(f"{self.path.name} has no field {name!r}, but {', '.join(self._names)}")
-        return self._read(name)
+        return self._read(self.path, name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -105,14 +99,8 @@ class Cells(Fields):
     """
 
     def __init__(self, path: Path):
-        super().__init__(path)
+        super().__init__(path, field_names(path), lambda path, name: read_cells(path, [name])[1][name])
         self._cells, self.lower, self.spacing = read_grid(path)
-
-    def _find_names(self) -> list[str]:
-        return field_names(self.path)
-
-    def _read(self, name: str) -> np.ndarray:
-        return read_cells(self.path, [name])[1][name]
 
     @cached_property
     def centers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -136,11 +124,9 @@ class Cells(Fields):
 class Particles(Fields):
     """Columns of all particles: scalars (n,), vectors (n, 3), the stress (n, 6) as xx, yy, zz, xy, yz, xz."""
 
-    def _find_names(self) -> list[str]:
-        return ["position", *field_names(self.path)]
-
-    def _read(self, name: str) -> np.ndarray:
-        return read_particles(self.path, [name])[1][name]
+    def __init__(self, path: Path):
+        names = ["position", *field_names(path)]
+        super().__init__(path, names, lambda path, name: read_particles(path, [name])[1][name])
 
     def to_pandas(self) -> Any:
         """As a DataFrame of pandas, which has to be installed; a vector makes a column per component."""
