@@ -67,8 +67,8 @@ def draw_charts(path: Path, charts: Sequence[Chart], columns: int) -> Path:
         return _save(figure, path)
 
 
-def draw_pictures(path: Path, pictures: Sequence[Picture], columns: int, unit: str) -> Path:
-    """Draw the pictures, whose extents are in `unit`, row by row; returns `path`."""
+def draw_pictures(path: Path, pictures: Sequence[Picture], columns: int, unit: str, axes_names: str = "xy") -> Path:
+    """Draw the pictures, whose extents are in `unit`, row by row; `axes_names`: to the right and up. Returns `path`."""
     rows = -(-len(pictures) // columns)
     left, right, bottom, top = pictures[0].extent
     height = WIDTH / columns * (top - bottom) / (right - left) + TITLE
@@ -78,9 +78,9 @@ def draw_pictures(path: Path, pictures: Sequence[Picture], columns: int, unit: s
         for axes, picture in zip(grid.flat, pictures, strict=False):
             _draw_picture(axes, picture)
         for axes in grid[-1]:
-            axes.set_xlabel(f"x [{unit}]")
+            axes.set_xlabel(f"{axes_names[0]} [{unit}]")
         for axes in grid[:, 0]:
-            axes.set_ylabel(f"y [{unit}]")
+            axes.set_ylabel(f"{axes_names[1]} [{unit}]")
         return _save(figure, path)
 
 

@@ -52,7 +52,9 @@ def draw_verdicts(
             axes.set_yticks(np.arange(len(rows[1])) + 0.5, rows[1], fontsize=7)
         for axes in list(grid.flat)[len(maps) :]:
             axes.set_visible(False)
-        figure.supxlabel(columns[0], x=0.01, ha="left", fontsize=9)
+        for axes in list(grid.flat)[max(len(maps) - across, 0) : len(maps)]:  # the lowest of each column
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel(columns[0], fontsize=7)
         figure.supylabel(rows[0], fontsize=9)
         figure.suptitle(title, fontsize=10)
         patches = [Patch(color=color, label=name) for name, color in colors.items()]

@@ -182,7 +182,7 @@ def _draw_wall(cells: int) -> Path:
     _, fields, (low, high) = read_layer(series(directory, "cells")[-1][1], normal=0)
     pictures = [
         Picture(
-            f"{name}, y to the right, z upwards",
+            name,
             fields[key] / size,
             (low[1], high[1], low[2], high[2]),
             "inferno",
@@ -193,4 +193,4 @@ def _draw_wall(cells: int) -> Path:
             ("impulse", "impulse", "Pa s", 1.0),
         )
     ]
-    return draw_pictures(DIRECTORY / "wall.png", pictures, columns=2, unit="m")
+    return draw_pictures(DIRECTORY / "wall.png", pictures, columns=2, unit="m", axes_names="yz")
